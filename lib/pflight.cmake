@@ -1,0 +1,61 @@
+# What the library is made of, as plain lists: include() this file to take pflight into a build of your own
+# (PX4, ArduPilot, Zephyr, ESP-IDF) without its targets. No globs, so that a stray file never changes a build.
+#
+#   PFLIGHT_INCLUDE_DIR      the folder for -I
+#   PFLIGHT_LIB_SOURCES      absolute paths of the sources; drop the model_ and sensor_ files you do not use
+#   PFLIGHT_LIB_HEADERS      absolute paths of the public headers
+#   PFLIGHT_COMPILE_OPTIONS  the flags that the results depend on: give them to the sources themselves
+#                            (target_compile_options(... PRIVATE ...)), so that they win over directory flags
+#
+# A port (pflight/port.h) is needed beside it: take a folder of port/ or write your own.
+
+set(PFLIGHT_INCLUDE_DIR "${CMAKE_CURRENT_LIST_DIR}/include")
+
+set(PFLIGHT_LIB_SOURCES
+  math.c
+  rng.c
+  normals.c
+  arena.c
+  filter.c
+  weights.c
+  resample.c
+  moments.c
+  estimate.c
+  reset.c
+  snapshot.c
+  forecast.c
+  meter.c
+  status.c
+  self_test.c
+  model_land_vehicle.c
+  model_constant_velocity.c
+  model_odometry.c
+  sensor_position.c
+  sensor_range.c
+  sensor_range_bearing.c
+)
+list(TRANSFORM PFLIGHT_LIB_SOURCES PREPEND "${CMAKE_CURRENT_LIST_DIR}/src/")
+
+set(PFLIGHT_LIB_HEADERS
+  pflight.h
+  filter.h
+  math.h
+  models.h
+  port.h
+  rng.h
+  sensors.h
+  status.h
+)
+list(TRANSFORM PFLIGHT_LIB_HEADERS PREPEND "${PFLIGHT_INCLUDE_DIR}/pflight/")
+
+# The same bits everywhere: no fused multiply-add, no value-changing optimisation. No errno, so that sqrtf is one
+# instruction. -O3 vectorises the particle loops; a build for size (MinSizeRel) or for debugging keeps its own level.
+set(PFLIGHT_COMPILE_OPTIONS "")
+if(CMAKE_C_COMPILER_ID MATCHES "GNU|Clang")
+  set(PFLIGHT_COMPILE_OPTIONS
+    -fno-fast-math
+    -ffp-contract=off
+    -fno-math-errno
+    $<$<OR:$<CONFIG:Release>,$<CONFIG:RelWithDebInfo>>:-O3>
+  )
+endif()

@@ -1,0 +1,49 @@
+/* The bits of a float as an integer and back, and the exponent test for infinities and NaN. Integer tests stay right
+ * when a firmware's flags make the compiler assume that NaN does not exist; memcpy keeps aliasing rules. */
+#ifndef PFL_BITS_H
+#define PFL_BITS_H
+
+#include <float.h>
+#include <stdbool.h>
+#include <stdint.h>
+#include <string.h>
+
+#if defined(__FAST_MATH__) || (defined(__FINITE_MATH_ONLY__) && (__FINITE_MATH_ONLY__ != 0))
+#error "pflight needs strict IEEE arithmetic: build lib/ without -ffast-math and -ffinite-math-only"
+#endif
+#if FLT_EVAL_METHOD != 0
+#error "pflight needs floats evaluated as floats: use SSE math on i386, -fexcess-precision=fast on s390x"
+#endif
+
+static inline int32_t pfl_bits(float x)
+{
+    int32_t i;
+    memcpy(&i, &x, sizeof i);
+    return i;
+}
+
+static inline float pfl_from_bits(int32_t i)
+{
+    float x;
+    memcpy(&x, &i, sizeof x);
+    return x;
+}
+
+static inline uint32_t pfl_load_u32(const float *p)
+{
+    uint32_t u;
+    memcpy(&u, p, sizeof u);
+    return u;
+}
+
+static inline void pfl_store_u32(float *p, uint32_t u)
+{
+    memcpy(p, &u, sizeof u);
+}
+
+static inline bool pfl_is_finite(float x)
+{
+    return ((uint32_t)pfl_bits(x) & 0x7F800000u) != 0x7F800000u;
+}
+
+#endif

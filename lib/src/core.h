@@ -1,0 +1,95 @@
+/* What the files of the filter share: the control block at the front of the arena, and the steps of a cycle. Private
+ * to lib/.
+ *
+ * Weights. A column of the arena holds log-weights s_i; particle i weighs exp(s_i - s_top), where s_top lies one
+ * float above the largest s_i. An update writes the new log-weights to the other weight column ("scratch") and
+ * commits by exchanging the two pointers, so a refused update leaves no trace. Every log-likelihood is taken less
+ * PFL_LOGLIK_MAX first: a legal one is then strictly negative, NaN and positive ones stand out in a single integer
+ * comparison, and the order of negative floats is the reverse order of their bits. */
+#ifndef PFL_CORE_H
+#define PFL_CORE_H
+
+#include "pflight/filter.h"
+#include "pflight/rng.h"
+
+#include "bits.h"
+
+#define PFL_ALIVE 0x70666C79u /* "pfly": the arena holds a filter */
+#define PFL_GROUP 16u         /* particles in the first batch of a predict, which decides whether to go on */
+
+/* Cycle counting of one filter cycle: differences are taken at every batch, so that a narrow counter may wrap. */
+typedef struct {
+    uint32_t mask;  /* of the port's counter; 0: none */
+    uint32_t since; /* counter at the last difference */
+    uint32_t used;  /* counted in this filter cycle */
+} pfl_meter_t;
+
+struct pfl {
+    uint32_t alive;
+    uint32_t busy; /* 1 inside a callback */
+    const pfl_config_t *config;
+    uint64_t t_us;
+    uint32_t stride;
+    float *mean;       /* D */
+    float *best;       /* D: state of the most likely particle */
+    float *delta;      /* D: jump of the mean at the last reset */
+    float *cov;        /* D (D + 1) / 2, upper triangle row by row */
+    float *lanes;      /* eight partial sums of each moment; saved particles during a predict */
+    float *work;       /* PFL_BATCH x (max(D, Q) + 1) */
+    float *x;          /* D columns of `stride` */
+    float *log_weight; /* column */
+    float *scratch;    /* column */
+    float log_weight_top;
+    float weight_sum; /* of the weights that `scratch` holds, if it does */
+    float test_ratio;
+    float ess;
+    uint32_t scratch_is_weights; /* scratch[i] = weight i, current */
+    uint32_t moments_current;    /* mean, cov belong to the filter's time */
+    uint32_t resample_pending;   /* put off by the budget */
+    uint64_t reset_t_us;
+    uint64_t t_fused_us;
+    pfl_meter_t meter;
+    uint32_t fused, rejected, faulted, resampled, quarantined, resets, overruns;
+    uint32_t overrun_counted; /* this cycle's overrun is in `overruns` */
+    uint32_t cycles_max, cycles_resample;
+    pfl_rng_t rng;
+};
+
+/* arena.c */
+bool pfl_config_is_good(const pfl_config_t *c);
+pfl_status_t pfl_lay_out(void *arena, size_t arena_bytes, const pfl_config_t *c, pfl_t **out);
+bool pfl_is_alive(const pfl_t *f);
+pfl_status_t pfl_enter(const pfl_t *f);                /* PFL_OK, or why a call on f cannot start */
+pfl_status_t pfl_fault(pfl_t *f, pfl_status_t status); /* counts a fault, tells the port, returns the status */
+
+/* filter.c */
+pfl_status_t pfl_draw_prior(pfl_t *f);
+
+/* weights.c: the two passes of an update */
+typedef struct {
+    int32_t worst_bits; /* largest bits of any log-likelihood: tells a NaN or a positive one */
+    int32_t best_bits;  /* smallest: the best log-likelihood */
+    int32_t top_bits;   /* smallest bits of the new log-weights: the largest log-weight */
+    uint32_t top_first; /* batch that holds it */
+} pfl_weigh_t;
+void pfl_weigh_start(pfl_weigh_t *w);
+void pfl_weigh_batch(const pfl_t *f, uint32_t first, uint32_t n, float *ll, pfl_weigh_t *w);
+void pfl_weights_equal(pfl_t *f);
+
+/* moments.c */
+void pfl_set_best(pfl_t *f, uint32_t first);
+bool pfl_moments(pfl_t *f, bool budgeted); /* false: the budget ran out first */
+void pfl_refresh(pfl_t *f);                /* moments for the filter's time, where the cached ones are older */
+void pfl_weights(pfl_t *f);                /* only the weights, into the scratch column, where they are not there */
+
+/* resample.c */
+void pfl_resample_now(pfl_t *f);
+
+/* meter.c */
+void pfl_meter_begin(pfl_t *f);    /* of a filter cycle */
+void pfl_meter_resume(pfl_t *f);   /* at the start of a call */
+void pfl_meter_pause(pfl_t *f);    /* at its end: brings the health up to date */
+uint32_t pfl_meter_read(pfl_t *f); /* cycles used so far */
+bool pfl_meter_spent(pfl_t *f);    /* has the budget run out? counts an overrun once a cycle */
+
+#endif

@@ -1,0 +1,181 @@
+/* What a filter answers: moments, the most likely particle, quantiles, the cloud, health, invariants. */
+#include "core.h"
+
+#include "rng_kernels.h"
+
+pfl_status_t pfl_estimate(pfl_t *f, float *mean, float *cov)
+{
+    const pfl_status_t entered = pfl_enter(f);
+    if (entered != PFL_OK) {
+        return entered;
+    }
+    const uint32_t states = f->config->states;
+    if (mean == NULL) {
+        return PFL_ERR_ARG;
+    }
+    if ((cov != NULL) && (f->config->moments != (uint16_t)PFL_MOMENTS_FULL)) {
+        return PFL_ERR_CONFIG;
+    }
+    pfl_refresh(f);
+    const uint32_t terms = (cov != NULL) ? ((states * (states + 1u)) / 2u) : 0u;
+    float sum = 0.0f;
+    for (uint32_t d = 0u; d < states; d++) {
+        sum += f->mean[d] * 0.0f;
+    }
+    for (uint32_t k = 0u; k < terms; k++) {
+        sum += f->cov[k] * 0.0f;
+    }
+    if (!pfl_is_finite(sum)) {
+        return pfl_fault(f, PFL_ERR_NONFINITE);
+    }
+    memcpy(mean, f->mean, sizeof(float) * states);
+    const float *upper = f->cov;
+    for (uint32_t d = 0u; (cov != NULL) && (d < states); d++) {
+        for (uint32_t e = d; e < states; e++) {
+            cov[(d * states) + e] = *upper;
+            cov[(e * states) + d] = *upper;
+            upper++;
+        }
+    }
+    return PFL_OK;
+}
+
+pfl_status_t pfl_most_likely(const pfl_t *f, float *state)
+{
+    if ((f == NULL) || (state == NULL)) {
+        return PFL_ERR_ARG;
+    }
+    if (!pfl_is_alive(f)) {
+        return PFL_ERR_CORRUPT;
+    }
+    memcpy(state, f->best, sizeof(float) * f->config->states);
+    return PFL_OK;
+}
+
+float pfl_effective_sample_size(const pfl_t *f)
+{
+    return ((f != NULL) && pfl_is_alive(f)) ? f->ess : 0.0f;
+}
+
+pfl_status_t pfl_particles(const pfl_t *f, pfl_view_t *view, float *log_weights)
+{
+    if ((f == NULL) || (view == NULL)) {
+        return PFL_ERR_ARG;
+    }
+    if (!pfl_is_alive(f)) {
+        return PFL_ERR_CORRUPT;
+    }
+    const pfl_view_t all = {f->x, f->stride, 0u, f->config->particles};
+    *view = all;
+    for (uint32_t i = 0u; (log_weights != NULL) && (i < all.n); i++) {
+        log_weights[i] = f->log_weight[i] - f->log_weight_top;
+    }
+    return PFL_OK;
+}
+
+/* ---- Quantiles: bisection over the ordered bits of a float, with weights as integers -------------------------- */
+
+/* Order-preserving integer image of a float. */
+static uint32_t key_of(float x)
+{
+    const uint32_t u = (uint32_t)pfl_bits(x);
+    return ((u & 0x80000000u) != 0u) ? ~u : (u | 0x80000000u);
+}
+
+static float from_key(uint32_t key)
+{
+    const uint32_t u = ((key & 0x80000000u) != 0u) ? (key & 0x7FFFFFFFu) : ~key;
+    return pfl_from_bits((int32_t)u);
+}
+
+static uint64_t weight_up_to(const pfl_t *f, const float *x, uint32_t key)
+{
+    uint64_t sum = 0u;
+    for (uint32_t i = 0u; i < f->config->particles; i++) {
+        sum += (key_of(x[i]) <= key) ? (uint64_t)pfl_load_u32(&f->scratch[i]) : 0u;
+    }
+    return sum;
+}
+
+pfl_status_t pfl_quantile(pfl_t *f, uint16_t state, float p, float *value)
+{
+    const pfl_status_t entered = pfl_enter(f);
+    if (entered != PFL_OK) {
+        return entered;
+    }
+    if ((value == NULL) || (state >= f->config->states) || !(p > 0.0f) || !(p <= 1.0f)) {
+        return PFL_ERR_ARG;
+    }
+    pfl_weights(f);
+    const float scale = 2.0e9f / f->weight_sum;
+    for (uint32_t i = 0u; i < f->config->particles; i++) {
+        pfl_store_u32(&f->scratch[i], (uint32_t)(int32_t)(f->scratch[i] * scale));
+    }
+    f->scratch_is_weights = 0u;
+    const float *x = &f->x[(size_t)state * f->stride];
+    const uint64_t total = weight_up_to(f, x, UINT32_MAX);
+    const uint64_t share = (total * (uint32_t)(p * 16777216.0f)) >> 24; /* p in steps of 2^-24 */
+    const uint64_t wanted = (share > 0u) ? share : 1u;
+    uint32_t low = 0u;
+    uint32_t high = UINT32_MAX;
+    while (low < high) {
+        const uint32_t middle = low + ((high - low) / 2u);
+        if (weight_up_to(f, x, middle) >= wanted) {
+            high = middle;
+        } else {
+            low = middle + 1u;
+        }
+    }
+    *value = from_key(low);
+    return PFL_OK;
+}
+
+/* ---- Health --------------------------------------------------------------------------------------------------- */
+
+pfl_status_t pfl_health(const pfl_t *f, pfl_health_t *out)
+{
+    if ((f == NULL) || (out == NULL)) {
+        return PFL_ERR_ARG;
+    }
+    if (!pfl_is_alive(f)) {
+        return PFL_ERR_CORRUPT;
+    }
+    memset(out, 0, sizeof *out);
+    out->t_us = f->t_us;
+    out->t_fused_us = f->t_fused_us;
+    out->ess = f->ess;
+    out->test_ratio = f->test_ratio;
+    out->fused = f->fused;
+    out->rejected = f->rejected;
+    out->faulted = f->faulted;
+    out->resampled = f->resampled;
+    out->quarantined = f->quarantined;
+    out->resets = f->resets;
+    out->overruns = f->overruns;
+    out->cycles_last = f->meter.used;
+    out->cycles_max = f->cycles_max;
+    out->cycles_resample = f->cycles_resample;
+    out->counter_usable = f->meter.mask != 0u;
+    return PFL_OK;
+}
+
+bool pfl_invariants_hold(const pfl_t *f)
+{
+    if ((f == NULL) || !pfl_is_alive(f) || (f->config == NULL) || !pfl_config_is_good(f->config)) {
+        return false;
+    }
+    const uint32_t count = f->config->particles;
+    bool hold = (f->stride == PFL_CEIL8(count)) && pfl_rng_alive(&f->rng) && (f->busy == 0u) &&
+                pfl_is_finite(f->log_weight_top) && (f->ess >= 1.0f) && (f->ess <= (float)count);
+    for (uint32_t d = 0u; d < f->config->states; d++) {
+        const float *x = &f->x[(size_t)d * f->stride];
+        for (uint32_t i = 0u; i < count; i++) {
+            hold = hold && pfl_is_finite(x[i]);
+        }
+    }
+    for (uint32_t i = 0u; i < count; i++) {
+        const float relative = f->log_weight[i] - f->log_weight_top;
+        hold = hold && (pfl_bits(relative) < 0) && ((uint32_t)pfl_bits(relative) <= 0xFF800000u);
+    }
+    return hold;
+}

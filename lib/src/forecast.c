@@ -1,0 +1,70 @@
+/* Copies of a filter, and prediction to a horizon on such a copy. */
+#include "core.h"
+
+static float *moved(const float *p, const pfl_t *from, pfl_t *to)
+{
+    return (float *)(void *)((unsigned char *)to + ((const unsigned char *)p - (const unsigned char *)from));
+}
+
+pfl_status_t pfl_fork(const pfl_t *f, void *arena, size_t arena_bytes, pfl_t **out)
+{
+    if (out == NULL) {
+        return PFL_ERR_ARG;
+    }
+    *out = NULL;
+    const pfl_status_t entered = pfl_enter(f);
+    if (entered != PFL_OK) {
+        return entered;
+    }
+    const pfl_config_t *c = f->config;
+    const size_t bytes = PFL_ARENA_BYTES(c->particles, c->states, c->noises);
+    if ((arena == (const void *)f) || (arena == NULL) || (((uintptr_t)arena & 7u) != 0u) || (arena_bytes < bytes)) {
+        return PFL_ERR_MEMORY;
+    }
+    memcpy(arena, f, bytes);
+    pfl_t *copy = (pfl_t *)arena;
+    copy->mean = moved(f->mean, f, copy);
+    copy->best = moved(f->best, f, copy);
+    copy->delta = moved(f->delta, f, copy);
+    copy->cov = moved(f->cov, f, copy);
+    copy->lanes = moved(f->lanes, f, copy);
+    copy->work = moved(f->work, f, copy);
+    copy->x = moved(f->x, f, copy);
+    copy->log_weight = moved(f->log_weight, f, copy);
+    copy->scratch = moved(f->scratch, f, copy);
+    pfl_rng_long_jump(&copy->rng);
+    *out = copy;
+    return PFL_OK;
+}
+
+pfl_status_t pfl_forecast(const pfl_t *f, void *arena, size_t arena_bytes, const pfl_horizon_t *horizon, float *mean,
+                          float *cov, pfl_t **out)
+{
+    if ((horizon == NULL) || (mean == NULL) || (horizon->step_us == 0u) || (horizon->steps == 0u)) {
+        return PFL_ERR_ARG;
+    }
+    pfl_t *copy = NULL;
+    pfl_status_t status = pfl_fork(f, arena, arena_bytes, &copy);
+    if (status != PFL_OK) {
+        return status;
+    }
+    if ((cov != NULL) && (copy->config->moments != (uint16_t)PFL_MOMENTS_FULL)) {
+        return PFL_ERR_CONFIG;
+    }
+    const size_t states = copy->config->states;
+    pfl_status_t worst = pfl_resample(copy);
+    for (uint32_t k = 0u; (k < horizon->steps) && (worst >= PFL_OK); k++) {
+        const uint64_t t_us = copy->t_us;
+        const void *u = (horizon->control != NULL) ? horizon->control(horizon->control_user, k, t_us) : NULL;
+        status = pfl_predict(copy, t_us + horizon->step_us, u);
+        worst = ((status < PFL_OK) || (worst == PFL_OK)) ? status : worst;
+        if (worst >= PFL_OK) {
+            status = pfl_estimate(copy, &mean[k * states], (cov != NULL) ? &cov[k * states * states] : NULL);
+            worst = (status < PFL_OK) ? status : worst;
+        }
+    }
+    if (out != NULL) {
+        *out = copy;
+    }
+    return worst;
+}

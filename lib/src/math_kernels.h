@@ -1,0 +1,134 @@
+/* The float functions as inline kernels, for loops that a compiler should turn into vectors: no branches, no calls,
+ * selections on integer masks. Coefficients are our own minimax fits (Remez exchange in 40 digits, rounded to float;
+ * the fit's relative error stands beside each). math.h tells ranges and measured errors. */
+#ifndef PFL_MATH_KERNELS_H
+#define PFL_MATH_KERNELS_H
+
+#include "bits.h"
+
+#define PFL_ROUND_MAGIC 12582912.0f /* 1.5 * 2^23: adding it rounds to an integer held in the low mantissa bits */
+#define PFL_LN2_HI 0.693359375f     /* 9 significant bits: k * PFL_LN2_HI is exact for |k| < 2^15 */
+#define PFL_LN2_LO (-2.12194442e-4f)
+
+static inline float pfl_select(int32_t mask, float if_set, float if_clear)
+{
+    return pfl_from_bits((pfl_bits(if_set) & mask) | (pfl_bits(if_clear) & ~mask));
+}
+
+/* 2^k for -126 <= k <= 127. */
+static inline float pfl_pow2i(int32_t k)
+{
+    return pfl_from_bits((int32_t)((uint32_t)(k + 127) << 23));
+}
+
+static inline float pfl_exp_kernel(float x)
+{
+    const float top = 88.72283905f;
+    const float bottom = -87.33654475f;
+    const float high = (x > top) ? top : x; /* both keep a NaN */
+    const float c = (high < bottom) ? bottom : high;
+    const float biased = (c * 1.44269504f) + PFL_ROUND_MAGIC;
+    const float kf = biased - PFL_ROUND_MAGIC;
+    const int32_t k = pfl_bits(biased) - pfl_bits(PFL_ROUND_MAGIC);
+    const float r = (c - (kf * PFL_LN2_HI)) - (kf * PFL_LN2_LO);
+    float p = 1.38145406e-3f; /* exp(r) = 1 + r + r^2 P(r), 3.1e-9 */
+    p = (p * r) + 8.36874545e-3f;
+    p = (p * r) + 4.16683890e-2f;
+    p = (p * r) + 1.66665211e-1f;
+    p = (p * r) + 4.99999940e-1f;
+    const float e = ((p * (r * r)) + r) + 1.0f;
+    const int32_t half = k >> 1; /* 2^128 is out of a float's reach: two factors, both exact */
+    const float y = (e * pfl_pow2i(half)) * pfl_pow2i(k - half);
+    const float low = (x < bottom) ? 0.0f : y;
+    return (x > top) ? pfl_from_bits(0x7F800000) : low;
+}
+
+/* log(m 2^e) for positive normal m 2^e, no special cases. */
+static inline float pfl_log_positive_kernel(float x)
+{
+    const int32_t i = pfl_bits(x) - 0x3F3504F3; /* m in [sqrt(1/2), sqrt(2)) */
+    const float e = (float)(i >> 23);
+    const float t = pfl_from_bits((i & 0x007FFFFF) + 0x3F3504F3) - 1.0f;
+    float p = -7.63449371e-2f; /* log(1+t) = t - t^2/2 + t^3 P(t), 5.8e-9 */
+    p = (p * t) + 1.27615750e-1f;
+    p = (p * t) - 1.31601825e-1f;
+    p = (p * t) + 1.42017588e-1f;
+    p = (p * t) - 1.66233569e-1f;
+    p = (p * t) + 2.00012267e-1f;
+    p = (p * t) - 2.50008196e-1f;
+    p = (p * t) + 3.33333313e-1f;
+    const float t2 = t * t;
+    const float tail = ((t2 * t) * p) + (e * PFL_LN2_LO);
+    return ((tail - (0.5f * t2)) + t) + (e * PFL_LN2_HI);
+}
+
+static inline float pfl_log_kernel(float x)
+{
+    const int32_t i = pfl_bits(x);
+    const float y = pfl_log_positive_kernel(x);
+    const int32_t small = -(int32_t)((i & 0x7FFFFFFF) < 0x00800000);    /* zero, subnormal */
+    const int32_t negative = (i >> 31) & ~small;                        /* below: NaN */
+    const int32_t special = -(int32_t)((i & 0x7FFFFFFF) >= 0x7F800000); /* inf, NaN: as they are */
+    const float a = pfl_select(small, pfl_from_bits((int32_t)0xFF800000u), y);
+    const float b = pfl_select(special, x, a);
+    return pfl_select(negative, pfl_from_bits(0x7FC00000), b);
+}
+
+static inline void pfl_sincos_kernel(float x, float *s, float *c)
+{
+    const float biased = (x * 0.636619772f) + PFL_ROUND_MAGIC;
+    const float kf = biased - PFL_ROUND_MAGIC;
+    const int32_t k = pfl_bits(biased);
+    /* pi/2 in parts of 14, 14 and 24 bits (Cody and Waite 1980): two exact products up to |k| = 1024 */
+    const float r = ((x - (kf * 1.5706787109375f)) - (kf * 1.17614865e-4f)) - (kf * 9.9209358e-10f);
+    const float r2 = r * r;
+    float ps = -1.95149580e-4f; /* sin r = r + r^3 P(r^2), 3.8e-9 */
+    ps = (ps * r2) + 8.33215844e-3f;
+    ps = (ps * r2) - 1.66666552e-1f;
+    const float sr = ((ps * r2) * r) + r;
+    float pc = 2.44380899e-5f; /* cos r = 1 - r^2/2 + r^4 P(r^2), 9.6e-11 */
+    pc = (pc * r2) - 1.38873642e-3f;
+    pc = (pc * r2) + 4.16666456e-2f;
+    const float cr = ((pc * (r2 * r2)) - (0.5f * r2)) + 1.0f;
+    const int32_t swap = -(k & 1); /* odd quadrant: sine and cosine change places */
+    const int32_t change = (pfl_bits(sr) ^ pfl_bits(cr)) & swap;
+    const int32_t s_sign = (int32_t)((uint32_t)k << 30) & (int32_t)0x80000000u;
+    const int32_t c_sign = (int32_t)((uint32_t)(k + 1) << 30) & (int32_t)0x80000000u;
+    *s = pfl_from_bits((pfl_bits(sr) ^ change) ^ s_sign);
+    *c = pfl_from_bits((pfl_bits(cr) ^ change) ^ c_sign);
+}
+
+static inline float pfl_atan2_kernel(float y, float x)
+{
+    const int32_t sign_bit = (int32_t)0x80000000u;
+    const float ax = pfl_from_bits(pfl_bits(x) & 0x7FFFFFFF);
+    const float ay = pfl_from_bits(pfl_bits(y) & 0x7FFFFFFF);
+    const int32_t steep = -(int32_t)(ay > ax);
+    const float high = pfl_select(steep, ay, ax);
+    const float low = pfl_select(steep, ax, ay);
+    const int32_t origin = -(int32_t)(pfl_bits(high) == 0);
+    const float t = low / pfl_select(origin, 1.0f, high);
+    const float t2 = t * t;
+    float p = 2.92069977e-3f; /* atan t = t + t^3 P(t^2), 1.7e-8 */
+    p = (p * t2) - 1.63679570e-2f;
+    p = (p * t2) + 4.32119034e-2f;
+    p = (p * t2) - 7.55221769e-2f;
+    p = (p * t2) + 1.06660061e-1f;
+    p = (p * t2) - 1.42110556e-1f;
+    p = (p * t2) + 1.99937731e-1f;
+    p = (p * t2) - 3.33331525e-1f;
+    const float a = ((p * t2) * t) + t;
+    /* pi/2 and pi carry a correction, so that the difference keeps its last bits */
+    const float b = pfl_select(steep, (1.57079637f - a) - 4.37113883e-8f, a);
+    const int32_t back = -(int32_t)((pfl_bits(x) & sign_bit) != 0) & ~origin;
+    const float c = pfl_select(back, (3.14159274f - b) - 8.74227766e-8f, b);
+    return pfl_from_bits(pfl_bits(c) | (pfl_bits(y) & sign_bit));
+}
+
+static inline float pfl_wrap_pi_kernel(float x)
+{
+    const float k = ((x * 0.159154943f) + PFL_ROUND_MAGIC) - PFL_ROUND_MAGIC;
+    return ((x - (k * 6.28271484375f)) - (k * 4.70459461e-4f)) - (k * 3.96837432e-9f);
+}
+
+#endif

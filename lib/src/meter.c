@@ -1,0 +1,52 @@
+/* Counts the port's cycles over a filter cycle and holds them against the budget. Only differences modulo the
+ * counter's width are used; a difference of more than half the width is a counter that jumped back and counts as
+ * nothing. Nothing ever waits for the counter. */
+#include "core.h"
+
+#include "pflight/port.h"
+
+void pfl_meter_begin(pfl_t *f)
+{
+    f->meter.used = 0u;
+    f->cycles_resample = 0u;
+    f->overrun_counted = 0u;
+}
+
+void pfl_meter_resume(pfl_t *f)
+{
+    if (f->meter.mask != 0u) {
+        f->meter.since = pfl_port_cycles();
+    }
+}
+
+uint32_t pfl_meter_read(pfl_t *f)
+{
+    if (f->meter.mask != 0u) {
+        const uint32_t now = pfl_port_cycles();
+        const uint32_t passed = (now - f->meter.since) & f->meter.mask;
+        const uint32_t credible = (passed <= (f->meter.mask >> 1)) ? passed : 0u;
+        f->meter.used = ((UINT32_MAX - f->meter.used) > credible) ? (f->meter.used + credible) : UINT32_MAX;
+        f->meter.since = now;
+    }
+    return f->meter.used;
+}
+
+void pfl_meter_pause(pfl_t *f)
+{
+    const uint32_t used = pfl_meter_read(f);
+    f->cycles_max = (used > f->cycles_max) ? used : f->cycles_max;
+    (void)pfl_meter_spent(f);
+}
+
+bool pfl_meter_spent(pfl_t *f)
+{
+    const uint32_t budget = f->config->budget_cycles;
+    if ((budget == 0u) || (f->meter.mask == 0u) || (pfl_meter_read(f) <= budget)) {
+        return false;
+    }
+    if (f->overrun_counted == 0u) {
+        f->overrun_counted = 1u;
+        f->overruns += (f->overruns < UINT32_MAX) ? 1u : 0u;
+    }
+    return true;
+}

@@ -1,0 +1,248 @@
+/* Second pass of an update: weights, effective sample size, mean and covariance, in one sweep over the particles.
+ *
+ * Deviations are taken from the most likely particle, which lies inside the cloud, so one sweep loses nothing to
+ * cancellation. Every sum runs in eight lanes (particle i in lane i mod 8) that are added up as a fixed tree: the same
+ * bits from a scalar core and from any vector width. Columns are padded with particles of weight zero. */
+#include "core.h"
+
+#include "math_kernels.h"
+
+#define LANES 8u
+#define LANE_WEIGHT 0u /* rows of f->lanes: sum w, sum w^2, */
+#define LANE_SQUARE 1u
+#define LANE_MEAN 2u /* D rows of sum w dev, then D of sum w sin dev and D of sum w cos dev (angles only), */
+                     /* then the upper triangle of sum w dev_d dev_e */
+
+static float *lane_row(const pfl_t *f, uint32_t row)
+{
+    return f->lanes + ((size_t)row * LANES);
+}
+
+static float lane_sum(const float *lane)
+{
+    return ((lane[0] + lane[1]) + (lane[2] + lane[3])) + ((lane[4] + lane[5]) + (lane[6] + lane[7]));
+}
+
+/* exp(d) for d < 0, kept above 2^-63 so that squares stay normal numbers: 2^y, y = k + r, |r| <= 1/2. */
+static inline float weight_of(float d)
+{
+    const int32_t floor_bits = (int32_t)0xC22E4706u; /* -43.57 */
+    const int32_t bits = pfl_bits(d);
+    const float c = pfl_from_bits((bits < floor_bits) ? bits : floor_bits);
+    const float y = c * 1.44269504f;
+    const float biased = y + PFL_ROUND_MAGIC;
+    const float r = y - (biased - PFL_ROUND_MAGIC);
+    float p = 1.32764783e-3f; /* 7.5e-8 */
+    p = (p * r) + 9.67554189e-3f;
+    p = (p * r) + 5.55071309e-2f;
+    p = (p * r) + 2.40221202e-1f;
+    p = (p * r) + 6.93146944e-1f;
+    p = (p * r) + 1.00000012f;
+    return pfl_from_bits((int32_t)((uint32_t)pfl_bits(p) + ((uint32_t)pfl_bits(biased) << 23)));
+}
+
+/* One quantity a function: gcc vectorises a loop over eight accumulators, but not over sixteen. */
+static void sum_lanes(float *row, const float *restrict a, uint32_t n)
+{
+    float sum[LANES];
+    memcpy(sum, row, sizeof sum);
+    for (uint32_t i = 0u; i < n; i += LANES) {
+        for (uint32_t l = 0u; l < LANES; l++) {
+            sum[l] += a[i + l];
+        }
+    }
+    memcpy(row, sum, sizeof sum);
+}
+
+static void product_lanes(float *row, const float *a, const float *b, uint32_t n)
+{
+    float sum[LANES];
+    memcpy(sum, row, sizeof sum);
+    for (uint32_t i = 0u; i < n; i += LANES) {
+        for (uint32_t l = 0u; l < LANES; l++) {
+            sum[l] += a[i + l] * b[i + l];
+        }
+    }
+    memcpy(row, sum, sizeof sum);
+}
+
+static void weigh_lanes(pfl_t *f, uint32_t first, uint32_t n)
+{
+    const float *restrict s = &f->log_weight[first];
+    float *restrict w = &f->scratch[first];
+    const float top = f->log_weight_top;
+    for (uint32_t i = 0u; i < n; i++) {
+        w[i] = weight_of(s[i] - top);
+    }
+    for (uint32_t i = n; i < PFL_CEIL8(n); i++) {
+        w[i] = 0.0f;
+    }
+    sum_lanes(lane_row(f, LANE_WEIGHT), w, (uint32_t)PFL_CEIL8(n));
+    product_lanes(lane_row(f, LANE_SQUARE), w, w, (uint32_t)PFL_CEIL8(n));
+}
+
+static void mean_lanes(float *row, const float *restrict x, const float *restrict w, float centre, uint32_t n)
+{
+    float sum[LANES];
+    memcpy(sum, row, sizeof sum);
+    for (uint32_t i = 0u; i < n; i += LANES) {
+        for (uint32_t l = 0u; l < LANES; l++) {
+            sum[l] += w[i + l] * (x[i + l] - centre);
+        }
+    }
+    memcpy(row, sum, sizeof sum);
+}
+
+/* Deviations of one state into a work column; those of an angle wrapped, and its sine and cosine sums taken. */
+static void deviations(pfl_t *f, uint32_t d, const float *x, const float *w, uint32_t n)
+{
+    float *restrict dev = &f->work[(size_t)d * PFL_BATCH];
+    const float centre = f->best[d];
+    const bool circular = ((f->config->circular_mask >> d) & 1u) != 0u;
+    for (uint32_t i = 0u; i < n; i++) {
+        dev[i] = x[i] - centre;
+    }
+    if (circular) {
+        const uint32_t states = f->config->states;
+        float *restrict sine = lane_row(f, LANE_MEAN + states + d);
+        float *restrict cosine = lane_row(f, LANE_MEAN + (2u * states) + d);
+        for (uint32_t i = 0u; i < n; i += LANES) {
+            for (uint32_t l = 0u; l < LANES; l++) {
+                float s;
+                float c;
+                dev[i + l] = pfl_wrap_pi_kernel(dev[i + l]);
+                pfl_sincos_kernel(dev[i + l], &s, &c);
+                sine[l] += w[i + l] * s;
+                cosine[l] += w[i + l] * c;
+            }
+        }
+    }
+    product_lanes(lane_row(f, LANE_MEAN + d), w, dev, n);
+}
+
+static void state_lanes(pfl_t *f, uint32_t first, uint32_t n)
+{
+    const uint32_t states = f->config->states;
+    const uint32_t padded = (uint32_t)PFL_CEIL8(n);
+    const float *w = &f->scratch[first];
+    const bool full = f->config->moments == (uint16_t)PFL_MOMENTS_FULL;
+    for (uint32_t d = 0u; d < states; d++) {
+        const float *x = &f->x[((size_t)d * f->stride) + first];
+        if (full || (((f->config->circular_mask >> d) & 1u) != 0u)) {
+            deviations(f, d, x, w, padded);
+        } else {
+            mean_lanes(lane_row(f, LANE_MEAN + d), x, w, f->best[d], padded);
+        }
+    }
+    if (!full) {
+        return;
+    }
+    float *restrict weighted = &f->work[(size_t)states * PFL_BATCH];
+    uint32_t row = LANE_MEAN + (3u * states);
+    for (uint32_t d = 0u; d < states; d++) {
+        const float *dev = &f->work[(size_t)d * PFL_BATCH];
+        for (uint32_t i = 0u; i < padded; i++) {
+            weighted[i] = w[i] * dev[i];
+        }
+        for (uint32_t e = d; e < states; e++) {
+            product_lanes(lane_row(f, row), weighted, &f->work[(size_t)e * PFL_BATCH], padded);
+            row++;
+        }
+    }
+}
+
+/* Sums to moments. The shift of the mean from the centre is taken off the second moments again. */
+static void finish(pfl_t *f)
+{
+    const uint32_t states = f->config->states;
+    const float sum = lane_sum(lane_row(f, LANE_WEIGHT));
+    const float ess = (sum * sum) / lane_sum(lane_row(f, LANE_SQUARE));
+    const float count = (float)f->config->particles;
+    const float at_least_one = (ess < 1.0f) ? 1.0f : ess;
+    f->weight_sum = sum;
+    f->ess = (at_least_one > count) ? count : at_least_one;
+    float shift[PFL_STATES_MAX];
+    for (uint32_t d = 0u; d < states; d++) {
+        shift[d] = lane_sum(lane_row(f, LANE_MEAN + d)) / sum;
+        float from_centre = shift[d];
+        if (((f->config->circular_mask >> d) & 1u) != 0u) {
+            from_centre = pfl_atan2_kernel(lane_sum(lane_row(f, LANE_MEAN + states + d)),
+                                           lane_sum(lane_row(f, LANE_MEAN + (2u * states) + d)));
+            f->mean[d] = pfl_wrap_pi_kernel(f->best[d] + from_centre);
+        } else {
+            f->mean[d] = f->best[d] + from_centre;
+        }
+    }
+    if (f->config->moments == (uint16_t)PFL_MOMENTS_FULL) {
+        const uint32_t rows = LANE_MEAN + (3u * states);
+        uint32_t k = 0u;
+        for (uint32_t d = 0u; d < states; d++) {
+            for (uint32_t e = d; e < states; e++) {
+                const float c = (lane_sum(lane_row(f, rows + k)) / sum) - (shift[d] * shift[e]);
+                f->cov[k] = ((d == e) && (c < 0.0f)) ? 0.0f : c;
+                k++;
+            }
+        }
+    }
+}
+
+void pfl_set_best(pfl_t *f, uint32_t first)
+{
+    const uint32_t rest = f->config->particles - first;
+    const uint32_t n = (rest < PFL_BATCH) ? rest : PFL_BATCH;
+    uint32_t best = first;
+    int32_t bits = pfl_bits(f->log_weight[first]);
+    for (uint32_t i = first + 1u; i < (first + n); i++) {
+        const int32_t candidate = pfl_bits(f->log_weight[i]);
+        if (candidate < bits) {
+            bits = candidate;
+            best = i;
+        }
+    }
+    for (uint32_t d = 0u; d < f->config->states; d++) {
+        f->best[d] = f->x[((size_t)d * f->stride) + best];
+    }
+}
+
+void pfl_weights(pfl_t *f)
+{
+    const uint32_t count = f->config->particles;
+    if (f->scratch_is_weights != 0u) {
+        return;
+    }
+    memset(f->lanes, 0, sizeof(float) * LANES * LANE_MEAN);
+    for (uint32_t first = 0u; first < count; first += PFL_BATCH) {
+        weigh_lanes(f, first, ((count - first) < PFL_BATCH) ? (count - first) : PFL_BATCH);
+    }
+    f->weight_sum = lane_sum(lane_row(f, LANE_WEIGHT));
+    f->scratch_is_weights = 1u;
+}
+
+bool pfl_moments(pfl_t *f, bool budgeted)
+{
+    const uint32_t count = f->config->particles;
+    f->scratch_is_weights = 0u;
+    f->moments_current = 0u;
+    memset(f->lanes, 0, sizeof(float) * PFL_LANE_FLOATS(f->config->states));
+    for (uint32_t first = 0u; first < count; first += PFL_BATCH) {
+        const uint32_t n = ((count - first) < PFL_BATCH) ? (count - first) : PFL_BATCH;
+        if (budgeted && pfl_meter_spent(f)) {
+            return false;
+        }
+        weigh_lanes(f, first, n);
+        state_lanes(f, first, n);
+    }
+    finish(f);
+    f->scratch_is_weights = 1u;
+    f->moments_current = 1u;
+    return true;
+}
+
+void pfl_refresh(pfl_t *f)
+{
+    if (f->moments_current == 0u) {
+        const float ess = f->ess; /* stays that of the last update, unless the budget cut that one short */
+        (void)pfl_moments(f, false);
+        f->ess = (f->resample_pending != 0u) ? f->ess : ess;
+    }
+}

@@ -1,0 +1,30 @@
+/* One step of xoshiro128++ 1.0 (Blackman and Vigna, 2021). */
+#ifndef PFL_RNG_KERNELS_H
+#define PFL_RNG_KERNELS_H
+
+#include "pflight/rng.h"
+
+#include <stdbool.h>
+
+static inline uint32_t pfl_rotl(uint32_t x, uint32_t k)
+{
+    return (x << k) | (x >> (32u - k));
+}
+
+static inline uint32_t pfl_xoshiro_next(uint32_t s[4])
+{
+    const uint32_t result = pfl_rotl(s[0] + s[3], 7u) + s[0];
+    const uint32_t t = s[1] << 9;
+    s[2] ^= s[0];
+    s[3] ^= s[1];
+    s[1] ^= s[2];
+    s[0] ^= s[3];
+    s[2] ^= t;
+    s[3] = pfl_rotl(s[3], 11u);
+    return result;
+}
+
+/* False when a stream sits in the all-zero state, from which it would never come back. */
+bool pfl_rng_alive(const pfl_rng_t *rng);
+
+#endif

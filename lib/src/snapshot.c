@@ -1,0 +1,239 @@
+/* A filter as bytes and back: little-endian 32-bit words, so that a recorder on one machine feeds a replay on another.
+ *
+ *     magic, version, N, D, Q, counters and clocks, random generator, moments, states, log-weights, CRC-32
+ *
+ * A restore looks at every word before it changes the first one. */
+#include "core.h"
+
+#include "rng_kernels.h"
+
+#define SNAPSHOT_MAGIC 0x73706670u /* "pfps" */
+#define SNAPSHOT_VERSION 1u
+#define HEAD_WORDS 25u
+#define RNG_WORDS ((4u * PFL_RNG_LANES) + 4u)
+
+static size_t moment_words(size_t states)
+{
+    return (3u * states) + ((states * (states + 1u)) / 2u);
+}
+
+static size_t total_words(const pfl_t *f)
+{
+    const size_t states = f->config->states;
+    return HEAD_WORDS + RNG_WORDS + moment_words(states) + ((size_t)f->config->particles * (states + 1u)) + 1u;
+}
+
+static void put_word(unsigned char *at, uint32_t word)
+{
+    at[0] = (unsigned char)(word & 0xFFu);
+    at[1] = (unsigned char)((word >> 8) & 0xFFu);
+    at[2] = (unsigned char)((word >> 16) & 0xFFu);
+    at[3] = (unsigned char)(word >> 24);
+}
+
+static uint32_t get_word(const unsigned char *at)
+{
+    return (uint32_t)at[0] | ((uint32_t)at[1] << 8) | ((uint32_t)at[2] << 16) | ((uint32_t)at[3] << 24);
+}
+
+/* CRC-32 (reflected 0xEDB88320), bit by bit: no table to keep. */
+static uint32_t crc32(const unsigned char *bytes, size_t n)
+{
+    uint32_t crc = 0xFFFFFFFFu;
+    for (size_t i = 0u; i < n; i++) {
+        crc ^= bytes[i];
+        for (uint32_t bit = 0u; bit < 8u; bit++) {
+            crc = (crc >> 1) ^ (0xEDB88320u & (0u - (crc & 1u)));
+        }
+    }
+    return ~crc;
+}
+
+static unsigned char *put_floats(unsigned char *at, const float *x, size_t n)
+{
+    for (size_t i = 0u; i < n; i++) {
+        put_word(at, pfl_load_u32(&x[i]));
+        at += 4;
+    }
+    return at;
+}
+
+static const unsigned char *get_floats(const unsigned char *at, float *x, size_t n)
+{
+    for (size_t i = 0u; i < n; i++) {
+        pfl_store_u32(&x[i], get_word(at));
+        at += 4;
+    }
+    return at;
+}
+
+static void head_of(const pfl_t *f, uint32_t head[HEAD_WORDS])
+{
+    const uint32_t words[HEAD_WORDS] = {SNAPSHOT_MAGIC,
+                                        SNAPSHOT_VERSION,
+                                        f->config->particles,
+                                        f->config->states,
+                                        f->config->noises,
+                                        (uint32_t)f->t_us,
+                                        (uint32_t)(f->t_us >> 32),
+                                        (uint32_t)f->reset_t_us,
+                                        (uint32_t)(f->reset_t_us >> 32),
+                                        (uint32_t)f->t_fused_us,
+                                        (uint32_t)(f->t_fused_us >> 32),
+                                        (uint32_t)pfl_bits(f->log_weight_top),
+                                        (uint32_t)pfl_bits(f->weight_sum),
+                                        (uint32_t)pfl_bits(f->test_ratio),
+                                        (uint32_t)pfl_bits(f->ess),
+                                        f->moments_current,
+                                        f->resample_pending,
+                                        f->fused,
+                                        f->rejected,
+                                        f->faulted,
+                                        f->resampled,
+                                        f->quarantined,
+                                        f->resets,
+                                        f->overruns,
+                                        f->config->moments};
+    memcpy(head, words, sizeof words);
+}
+
+size_t pfl_snapshot_bytes(const pfl_t *f)
+{
+    return ((f != NULL) && pfl_is_alive(f)) ? (4u * total_words(f)) : 0u;
+}
+
+pfl_status_t pfl_snapshot(const pfl_t *f, void *buffer, size_t buffer_bytes)
+{
+    const pfl_status_t entered = pfl_enter(f);
+    if (entered != PFL_OK) {
+        return entered;
+    }
+    const size_t bytes = pfl_snapshot_bytes(f);
+    if (buffer == NULL) {
+        return PFL_ERR_ARG;
+    }
+    if (buffer_bytes < bytes) {
+        return PFL_ERR_MEMORY;
+    }
+    const size_t states = f->config->states;
+    uint32_t head[HEAD_WORDS];
+    head_of(f, head);
+    unsigned char *at = (unsigned char *)buffer;
+    for (uint32_t k = 0u; k < HEAD_WORDS; k++) {
+        put_word(at, head[k]);
+        at += 4;
+    }
+    for (uint32_t k = 0u; k < RNG_WORDS; k++) {
+        put_word(at, (k < (4u * PFL_RNG_LANES)) ? f->rng.s[k / PFL_RNG_LANES][k % PFL_RNG_LANES]
+                                                : f->rng.one[k - (4u * PFL_RNG_LANES)]);
+        at += 4;
+    }
+    at = put_floats(at, f->mean, moment_words(states));
+    for (size_t d = 0u; d < states; d++) {
+        at = put_floats(at, &f->x[d * f->stride], f->config->particles);
+    }
+    at = put_floats(at, f->log_weight, f->config->particles);
+    put_word(at, crc32((const unsigned char *)buffer, bytes - 4u));
+    return PFL_OK;
+}
+
+/* ---- Restore -------------------------------------------------------------------------------------------------- */
+
+static bool head_fits(const pfl_t *f, const unsigned char *at)
+{
+    const float top = pfl_from_bits((int32_t)get_word(at + (4 * 11)));
+    const float sum = pfl_from_bits((int32_t)get_word(at + (4 * 12)));
+    const float ratio = pfl_from_bits((int32_t)get_word(at + (4 * 13)));
+    const float ess = pfl_from_bits((int32_t)get_word(at + (4 * 14)));
+    const bool shape = (get_word(at) == SNAPSHOT_MAGIC) && (get_word(at + 4) == SNAPSHOT_VERSION) &&
+                       (get_word(at + 8) == f->config->particles) && (get_word(at + 12) == f->config->states) &&
+                       (get_word(at + 16) == f->config->noises) && (get_word(at + (4 * 24)) == f->config->moments);
+    const bool numbers = pfl_is_finite(top) && pfl_is_finite(sum) && pfl_is_finite(ratio) && pfl_is_finite(ess);
+    return shape && numbers && (sum > 0.0f) && (ess >= 1.0f) && (ess <= (float)f->config->particles) &&
+           (get_word(at + (4 * 15)) <= 1u) && (get_word(at + (4 * 16)) <= 1u);
+}
+
+/* Streams alive, moments and states finite, log-weights below their top. */
+static bool body_is_good(const pfl_t *f, const unsigned char *at)
+{
+    const float top = pfl_from_bits((int32_t)get_word(at + (4 * 11)));
+    const size_t states = f->config->states;
+    const size_t finite = moment_words(states) + (states * f->config->particles);
+    pfl_rng_t rng;
+    for (uint32_t k = 0u; k < (4u * PFL_RNG_LANES); k++) {
+        rng.s[k / PFL_RNG_LANES][k % PFL_RNG_LANES] = get_word(at + (4u * (HEAD_WORDS + k)));
+    }
+    for (uint32_t k = 0u; k < 4u; k++) {
+        rng.one[k] = get_word(at + (4u * (HEAD_WORDS + (4u * PFL_RNG_LANES) + k)));
+    }
+    bool good = pfl_rng_alive(&rng);
+    const unsigned char *next = at + (4u * (HEAD_WORDS + RNG_WORDS));
+    for (size_t k = 0u; k < finite; k++) {
+        good = good && pfl_is_finite(pfl_from_bits((int32_t)get_word(next)));
+        next += 4;
+    }
+    for (uint32_t i = 0u; i < f->config->particles; i++) {
+        const int32_t bits = pfl_bits(pfl_from_bits((int32_t)get_word(next)) - top);
+        good = good && (bits < 0) && ((uint32_t)bits <= 0xFF800000u);
+        next += 4;
+    }
+    return good;
+}
+
+static uint64_t get_time(const unsigned char *at)
+{
+    return (uint64_t)get_word(at) | ((uint64_t)get_word(at + 4) << 32);
+}
+
+static void take_head(pfl_t *f, const unsigned char *at)
+{
+    f->t_us = get_time(at + (4 * 5));
+    f->reset_t_us = get_time(at + (4 * 7));
+    f->t_fused_us = get_time(at + (4 * 9));
+    f->log_weight_top = pfl_from_bits((int32_t)get_word(at + (4 * 11)));
+    f->weight_sum = pfl_from_bits((int32_t)get_word(at + (4 * 12)));
+    f->test_ratio = pfl_from_bits((int32_t)get_word(at + (4 * 13)));
+    f->ess = pfl_from_bits((int32_t)get_word(at + (4 * 14)));
+    f->moments_current = get_word(at + (4 * 15));
+    f->resample_pending = get_word(at + (4 * 16));
+    f->fused = get_word(at + (4 * 17));
+    f->rejected = get_word(at + (4 * 18));
+    f->faulted = get_word(at + (4 * 19));
+    f->resampled = get_word(at + (4 * 20));
+    f->quarantined = get_word(at + (4 * 21));
+    f->resets = get_word(at + (4 * 22));
+    f->overruns = get_word(at + (4 * 23));
+    f->scratch_is_weights = 0u;
+}
+
+pfl_status_t pfl_restore(pfl_t *f, const void *buffer, size_t buffer_bytes)
+{
+    const pfl_status_t entered = pfl_enter(f);
+    if (entered != PFL_OK) {
+        return entered;
+    }
+    if (buffer == NULL) {
+        return PFL_ERR_ARG;
+    }
+    const unsigned char *at = (const unsigned char *)buffer;
+    const size_t bytes = pfl_snapshot_bytes(f);
+    if ((buffer_bytes < bytes) || !head_fits(f, at) || (get_word(at + (bytes - 4u)) != crc32(at, bytes - 4u)) ||
+        !body_is_good(f, at)) {
+        return PFL_ERR_CORRUPT;
+    }
+    const size_t states = f->config->states;
+    take_head(f, at);
+    at += 4u * HEAD_WORDS;
+    for (uint32_t k = 0u; k < RNG_WORDS; k++) {
+        uint32_t *word = (k < (4u * PFL_RNG_LANES)) ? &f->rng.s[k / PFL_RNG_LANES][k % PFL_RNG_LANES]
+                                                    : &f->rng.one[k - (4u * PFL_RNG_LANES)];
+        *word = get_word(at);
+        at += 4;
+    }
+    at = get_floats(at, f->mean, moment_words(states));
+    for (size_t d = 0u; d < states; d++) {
+        at = get_floats(at, &f->x[d * f->stride], f->config->particles);
+    }
+    (void)get_floats(at, f->log_weight, f->config->particles);
+    return PFL_OK;
+}

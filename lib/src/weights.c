@@ -1,0 +1,47 @@
+/* First pass of an update: log-likelihoods into log-weights, and what decides whether they are accepted. core.h tells
+ * how the weights are kept. Integer minima and maxima do not depend on their order, so plain loops keep the bits. */
+#include "core.h"
+
+#include <limits.h>
+
+void pfl_weigh_start(pfl_weigh_t *w)
+{
+    w->worst_bits = INT32_MIN;
+    w->best_bits = INT32_MAX;
+    w->top_bits = INT32_MAX;
+    w->top_first = 0u;
+}
+
+void pfl_weigh_batch(const pfl_t *f, uint32_t first, uint32_t n, float *ll, pfl_weigh_t *w)
+{
+    const float *old = &f->log_weight[first];
+    const float old_top = f->log_weight_top;
+    int32_t worst = w->worst_bits;
+    int32_t best = w->best_bits;
+    int32_t top = INT32_MAX;
+    for (uint32_t i = 0u; i < n; i++) {
+        const float y = ll[i] - PFL_LOGLIK_MAX;
+        const float s = (old[i] - old_top) + y;
+        const int32_t y_bits = pfl_bits(y);
+        const int32_t s_bits = pfl_bits(s);
+        ll[i] = s;
+        worst = (y_bits > worst) ? y_bits : worst;
+        best = (y_bits < best) ? y_bits : best;
+        top = (s_bits < top) ? s_bits : top;
+    }
+    w->worst_bits = worst;
+    w->best_bits = best;
+    if (top < w->top_bits) {
+        w->top_bits = top;
+        w->top_first = first;
+    }
+}
+
+void pfl_weights_equal(pfl_t *f)
+{
+    for (uint32_t i = 0u; i < f->stride; i++) {
+        f->log_weight[i] = 0.0f;
+    }
+    f->log_weight_top = FLT_MIN; /* the smallest normal above 0 */
+    f->scratch_is_weights = 0u;
+}
