@@ -17,6 +17,9 @@ set(PFLIGHT_LIB_SOURCES
   normals.c
   arena.c
   filter.c
+  predict.c
+  constraint.c
+  kernel.c
   weights.c
   resample.c
   moments.c

@@ -38,6 +38,25 @@ static bool box_is_good(const pfl_config_t *c)
     return true;
 }
 
+static bool options_are_good(const pfl_config_t *c)
+{
+    const pfl_constraint_t *k = c->constraint;
+    const pfl_kernel_t *kernel = c->kernel;
+    const bool constraint =
+        (k == NULL) || ((k->inside != NULL) && (k->project != NULL) && (k->tries >= 1u) && (k->tries <= PFL_TRIES_MAX));
+    const bool jitter = (kernel == NULL) || ((c->moments == (uint16_t)PFL_MOMENTS_FULL) &&
+                                             pfl_is_finite(kernel->width) && (kernel->width > 0.0f) &&
+                                             (kernel->width < 1.0f) && ((kernel->states_mask >> c->states) == 0u));
+    return constraint && jitter;
+}
+
+/* Bytes for this configuration, retries of its constraint included. */
+size_t pfl_arena_bytes_of(const pfl_config_t *c)
+{
+    const size_t retry = ((c->constraint != NULL) && (c->constraint->tries > 1u)) ? PFL_RETRY_BYTES(c->states) : 0u;
+    return PFL_ARENA_BYTES(c->particles, c->states, c->noises) + retry;
+}
+
 bool pfl_config_is_good(const pfl_config_t *c)
 {
     const bool sizes = (c->particles >= 1u) && (c->particles <= PFL_PARTICLES_MAX) && (c->states >= 1u) &&
@@ -48,18 +67,17 @@ bool pfl_config_is_good(const pfl_config_t *c)
     const bool choices = (c->resampling <= (uint16_t)PFL_RESAMPLE_MULTINOMIAL) &&
                          (c->moments <= (uint16_t)PFL_MOMENTS_MEAN) && ((c->circular_mask >> c->states) == 0u);
     const bool ratio = pfl_is_finite(c->ess_ratio) && (c->ess_ratio >= 0.0f) && (c->ess_ratio <= 1.0f);
-    return choices && ratio && sensors_are_good(c) && box_is_good(c);
+    return choices && ratio && sensors_are_good(c) && box_is_good(c) && options_are_good(c);
 }
 
 pfl_status_t pfl_lay_out(void *arena, size_t arena_bytes, const pfl_config_t *c, pfl_t **out)
 {
     const size_t d = c->states;
     const size_t stride = PFL_CEIL8(c->particles);
-    if ((arena == NULL) || (((uintptr_t)arena & 7u) != 0u) ||
-        (arena_bytes < PFL_ARENA_BYTES(c->particles, c->states, c->noises))) {
+    if ((arena == NULL) || (((uintptr_t)arena & 7u) != 0u) || (arena_bytes < pfl_arena_bytes_of(c))) {
         return PFL_ERR_MEMORY;
     }
-    memset(arena, 0, PFL_ARENA_BYTES(c->particles, c->states, c->noises));
+    memset(arena, 0, pfl_arena_bytes_of(c));
     pfl_t *f = (pfl_t *)arena;
     float *next = (float *)(void *)((unsigned char *)arena + PFL_CONTROL_BYTES);
     f->config = c;
@@ -68,6 +86,8 @@ pfl_status_t pfl_lay_out(void *arena, size_t arena_bytes, const pfl_config_t *c,
     f->best = f->mean + d;
     f->delta = f->best + d;
     f->cov = f->delta + d;
+    f->kernel_mean = f->cov + ((d * (d + 1u)) / 2u);
+    f->kernel_cov = f->kernel_mean + d;
     next += PFL_MOMENT_FLOATS(d);
     f->lanes = next;
     next += PFL_LANE_FLOATS(d);
@@ -76,6 +96,7 @@ pfl_status_t pfl_lay_out(void *arena, size_t arena_bytes, const pfl_config_t *c,
     f->x = next;
     f->log_weight = f->x + (d * stride);
     f->scratch = f->log_weight + stride;
+    f->retry = ((c->constraint != NULL) && (c->constraint->tries > 1u)) ? (f->scratch + stride) : NULL;
     *out = f;
     return PFL_OK;
 }
@@ -96,9 +117,14 @@ pfl_status_t pfl_enter(const pfl_t *f)
     return (f->busy != 0u) ? PFL_ERR_BUSY : PFL_OK;
 }
 
+void pfl_count(uint32_t *counter, uint32_t more)
+{
+    *counter = ((UINT32_MAX - *counter) > more) ? (*counter + more) : UINT32_MAX;
+}
+
 pfl_status_t pfl_fault(pfl_t *f, pfl_status_t status)
 {
-    f->faulted += (f->faulted < UINT32_MAX) ? 1u : 0u;
+    pfl_count(&f->faulted, 1u);
     pfl_port_fault((int32_t)status);
     return status;
 }

@@ -30,15 +30,18 @@ struct pfl {
     const pfl_config_t *config;
     uint64_t t_us;
     uint32_t stride;
-    float *mean;       /* D */
-    float *best;       /* D: state of the most likely particle */
-    float *delta;      /* D: jump of the mean at the last reset */
-    float *cov;        /* D (D + 1) / 2, upper triangle row by row */
-    float *lanes;      /* eight partial sums of each moment; saved particles during a predict */
-    float *work;       /* PFL_BATCH x (max(D, Q) + 1) */
-    float *x;          /* D columns of `stride` */
-    float *log_weight; /* column */
-    float *scratch;    /* column */
+    float *mean;        /* D */
+    float *best;        /* D: state of the most likely particle */
+    float *delta;       /* D: jump of the mean at the last reset */
+    float *cov;         /* D (D + 1) / 2, upper triangle row by row */
+    float *kernel_mean; /* D: mean of the resampled cloud */
+    float *kernel_cov;  /* D (D + 1) / 2: its covariance, then the root of it */
+    float *lanes;       /* eight partial sums of each moment; saved particles during a predict */
+    float *work;        /* PFL_BATCH x (max(D, Q) + 1) */
+    float *x;           /* D columns of `stride` */
+    float *log_weight;  /* column */
+    float *scratch;     /* column */
+    float *retry;       /* PFL_BATCH x 2 D: a batch before its move, and a new attempt; null without retries */
     float log_weight_top;
     float weight_sum; /* of the weights that `scratch` holds, if it does */
     float test_ratio;
@@ -52,15 +55,33 @@ struct pfl {
     uint32_t fused, rejected, faulted, resampled, quarantined, resets, overruns;
     uint32_t overrun_counted; /* this cycle's overrun is in `overruns` */
     uint32_t cycles_max, cycles_resample;
+    uint32_t redrawn, projected;
     pfl_rng_t rng;
 };
 
 /* arena.c */
 bool pfl_config_is_good(const pfl_config_t *c);
+size_t pfl_arena_bytes_of(const pfl_config_t *c);
 pfl_status_t pfl_lay_out(void *arena, size_t arena_bytes, const pfl_config_t *c, pfl_t **out);
 bool pfl_is_alive(const pfl_t *f);
 pfl_status_t pfl_enter(const pfl_t *f);                /* PFL_OK, or why a call on f cannot start */
 pfl_status_t pfl_fault(pfl_t *f, pfl_status_t status); /* counts a fault, tells the port, returns the status */
+
+void pfl_count(uint32_t *counter, uint32_t more); /* adds, and stays at the end of its range */
+
+/* predict.c */
+void pfl_make_noise(pfl_t *f, uint32_t columns, uint32_t n);
+void pfl_clip_to_box(pfl_t *f, uint32_t first, uint32_t n);
+pfl_batch_t pfl_batch_at(pfl_t *f, uint32_t first, uint32_t n);
+uint32_t pfl_count_nonfinite(const pfl_t *f, uint32_t first, uint32_t n);
+pfl_status_t pfl_propagate(pfl_t *f, uint32_t dt_us, const void *u);
+
+/* constraint.c */
+void pfl_constraint_save(pfl_t *f, uint32_t first, uint32_t n);
+void pfl_constrain(pfl_t *f, const void *u, float dt_s, uint32_t first, uint32_t n);
+
+/* kernel.c */
+void pfl_kernel_move(pfl_t *f);
 
 /* filter.c */
 pfl_status_t pfl_draw_prior(pfl_t *f);
@@ -78,9 +99,10 @@ void pfl_weights_equal(pfl_t *f);
 
 /* moments.c */
 void pfl_set_best(pfl_t *f, uint32_t first);
-bool pfl_moments(pfl_t *f, bool budgeted); /* false: the budget ran out first */
-void pfl_refresh(pfl_t *f);                /* moments for the filter's time, where the cached ones are older */
-void pfl_weights(pfl_t *f);                /* only the weights, into the scratch column, where they are not there */
+bool pfl_moments(pfl_t *f, bool budgeted);                 /* false: the budget ran out first */
+void pfl_cloud_moments(pfl_t *f, float *mean, float *cov); /* elsewhere than into the cache */
+void pfl_refresh(pfl_t *f); /* moments for the filter's time, where the cached ones are older */
+void pfl_weights(pfl_t *f); /* only the weights, into the scratch column, where they are not there */
 
 /* resample.c */
 void pfl_resample_now(pfl_t *f);

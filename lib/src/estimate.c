@@ -2,6 +2,7 @@
 #include "core.h"
 
 #include "rng_kernels.h"
+#include "sqrt_kernel.h"
 
 pfl_status_t pfl_estimate(pfl_t *f, float *mean, float *cov)
 {
@@ -70,6 +71,30 @@ pfl_status_t pfl_particles(const pfl_t *f, pfl_view_t *view, float *log_weights)
     for (uint32_t i = 0u; (log_weights != NULL) && (i < all.n); i++) {
         log_weights[i] = f->log_weight[i] - f->log_weight_top;
     }
+    return PFL_OK;
+}
+
+pfl_status_t pfl_farthest(const pfl_t *f, uint16_t x_state, uint16_t y_state, float x, float y, float *distance)
+{
+    if ((f == NULL) || (distance == NULL)) {
+        return PFL_ERR_ARG;
+    }
+    if (!pfl_is_alive(f)) {
+        return PFL_ERR_CORRUPT;
+    }
+    if ((x_state >= f->config->states) || (y_state >= f->config->states) || !pfl_is_finite(x) || !pfl_is_finite(y)) {
+        return PFL_ERR_ARG;
+    }
+    const float *restrict px = &f->x[(size_t)x_state * f->stride];
+    const float *restrict py = &f->x[(size_t)y_state * f->stride];
+    float farthest = 0.0f;
+    for (uint32_t i = 0u; i < f->config->particles; i++) {
+        const float dx = px[i] - x;
+        const float dy = py[i] - y;
+        const float square = (dx * dx) + (dy * dy);
+        farthest = (square > farthest) ? square : farthest;
+    }
+    *distance = pfl_sqrt_kernel(farthest);
     return PFL_OK;
 }
 
@@ -150,6 +175,8 @@ pfl_status_t pfl_health(const pfl_t *f, pfl_health_t *out)
     out->faulted = f->faulted;
     out->resampled = f->resampled;
     out->quarantined = f->quarantined;
+    out->redrawn = f->redrawn;
+    out->projected = f->projected;
     out->resets = f->resets;
     out->overruns = f->overruns;
     out->cycles_last = f->meter.used;

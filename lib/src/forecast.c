@@ -17,7 +17,7 @@ pfl_status_t pfl_fork(const pfl_t *f, void *arena, size_t arena_bytes, pfl_t **o
         return entered;
     }
     const pfl_config_t *c = f->config;
-    const size_t bytes = PFL_ARENA_BYTES(c->particles, c->states, c->noises);
+    const size_t bytes = pfl_arena_bytes_of(c);
     if ((arena == (const void *)f) || (arena == NULL) || (((uintptr_t)arena & 7u) != 0u) || (arena_bytes < bytes)) {
         return PFL_ERR_MEMORY;
     }
@@ -32,6 +32,9 @@ pfl_status_t pfl_fork(const pfl_t *f, void *arena, size_t arena_bytes, pfl_t **o
     copy->x = moved(f->x, f, copy);
     copy->log_weight = moved(f->log_weight, f, copy);
     copy->scratch = moved(f->scratch, f, copy);
+    copy->kernel_mean = moved(f->kernel_mean, f, copy);
+    copy->kernel_cov = moved(f->kernel_cov, f, copy);
+    copy->retry = (f->retry != NULL) ? moved(f->retry, f, copy) : NULL;
     pfl_rng_long_jump(&copy->rng);
     *out = copy;
     return PFL_OK;

@@ -46,7 +46,7 @@ bool pfl_meter_spent(pfl_t *f)
     }
     if (f->overrun_counted == 0u) {
         f->overrun_counted = 1u;
-        f->overruns += (f->overruns < UINT32_MAX) ? 1u : 0u;
+        pfl_count(&f->overruns, 1u);
     }
     return true;
 }

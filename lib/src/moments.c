@@ -151,16 +151,11 @@ static void state_lanes(pfl_t *f, uint32_t first, uint32_t n)
     }
 }
 
-/* Sums to moments. The shift of the mean from the centre is taken off the second moments again. */
-static void finish(pfl_t *f)
+/* Sums to mean and covariance. The shift of the mean from the centre is taken off the second moments again. */
+static void finish(const pfl_t *f, float *mean, float *cov)
 {
     const uint32_t states = f->config->states;
     const float sum = lane_sum(lane_row(f, LANE_WEIGHT));
-    const float ess = (sum * sum) / lane_sum(lane_row(f, LANE_SQUARE));
-    const float count = (float)f->config->particles;
-    const float at_least_one = (ess < 1.0f) ? 1.0f : ess;
-    f->weight_sum = sum;
-    f->ess = (at_least_one > count) ? count : at_least_one;
     float shift[PFL_STATES_MAX];
     for (uint32_t d = 0u; d < states; d++) {
         shift[d] = lane_sum(lane_row(f, LANE_MEAN + d)) / sum;
@@ -168,9 +163,9 @@ static void finish(pfl_t *f)
         if (((f->config->circular_mask >> d) & 1u) != 0u) {
             from_centre = pfl_atan2_kernel(lane_sum(lane_row(f, LANE_MEAN + states + d)),
                                            lane_sum(lane_row(f, LANE_MEAN + (2u * states) + d)));
-            f->mean[d] = pfl_wrap_pi_kernel(f->best[d] + from_centre);
+            mean[d] = pfl_wrap_pi_kernel(f->best[d] + from_centre);
         } else {
-            f->mean[d] = f->best[d] + from_centre;
+            mean[d] = f->best[d] + from_centre;
         }
     }
     if (f->config->moments == (uint16_t)PFL_MOMENTS_FULL) {
@@ -179,11 +174,23 @@ static void finish(pfl_t *f)
         for (uint32_t d = 0u; d < states; d++) {
             for (uint32_t e = d; e < states; e++) {
                 const float c = (lane_sum(lane_row(f, rows + k)) / sum) - (shift[d] * shift[e]);
-                f->cov[k] = ((d == e) && (c < 0.0f)) ? 0.0f : c;
+                cov[k] = ((d == e) && (c < 0.0f)) ? 0.0f : c;
                 k++;
             }
         }
     }
+}
+
+/* Sum of the weights and effective sample size. */
+static void finish_weights(pfl_t *f)
+{
+    const float sum = lane_sum(lane_row(f, LANE_WEIGHT));
+    const float ess = (sum * sum) / lane_sum(lane_row(f, LANE_SQUARE));
+    const float count = (float)f->config->particles;
+    const float at_least_one = (ess < 1.0f) ? 1.0f : ess;
+    f->weight_sum = sum;
+    f->ess = (at_least_one > count) ? count : at_least_one;
+    f->scratch_is_weights = 1u;
 }
 
 void pfl_set_best(pfl_t *f, uint32_t first)
@@ -218,11 +225,11 @@ void pfl_weights(pfl_t *f)
     f->scratch_is_weights = 1u;
 }
 
-bool pfl_moments(pfl_t *f, bool budgeted)
+/* The sweep itself; false when the budget ran out first. */
+static bool sum_up(pfl_t *f, bool budgeted)
 {
     const uint32_t count = f->config->particles;
     f->scratch_is_weights = 0u;
-    f->moments_current = 0u;
     memset(f->lanes, 0, sizeof(float) * PFL_LANE_FLOATS(f->config->states));
     for (uint32_t first = 0u; first < count; first += PFL_BATCH) {
         const uint32_t n = ((count - first) < PFL_BATCH) ? (count - first) : PFL_BATCH;
@@ -232,10 +239,25 @@ bool pfl_moments(pfl_t *f, bool budgeted)
         weigh_lanes(f, first, n);
         state_lanes(f, first, n);
     }
-    finish(f);
-    f->scratch_is_weights = 1u;
+    return true;
+}
+
+bool pfl_moments(pfl_t *f, bool budgeted)
+{
+    f->moments_current = 0u;
+    if (!sum_up(f, budgeted)) {
+        return false;
+    }
+    finish_weights(f);
+    finish(f, f->mean, f->cov);
     f->moments_current = 1u;
     return true;
+}
+
+void pfl_cloud_moments(pfl_t *f, float *mean, float *cov)
+{
+    (void)sum_up(f, false);
+    finish(f, mean, cov);
 }
 
 void pfl_refresh(pfl_t *f)

@@ -216,7 +216,9 @@ void pfl_resample_now(pfl_t *f)
     }
     fill_free_slots(f, list_free_slots(f));
     pfl_weights_equal(f);
+    pfl_kernel_move(f);
+    f->scratch_is_weights = 0u;
     f->resample_pending = 0u;
-    f->resampled += (f->resampled < UINT32_MAX) ? 1u : 0u;
+    pfl_count(&f->resampled, 1u);
     f->cycles_resample += pfl_meter_read(f) - start;
 }

@@ -42,7 +42,7 @@ pfl_status_t pfl_reset(pfl_t *f, uint64_t t_us)
     f->t_fused_us = t_us;
     f->test_ratio = 0.0f;
     f->resample_pending = 0u;
-    f->resets += (f->resets < UINT32_MAX) ? 1u : 0u;
+    pfl_count(&f->resets, 1u);
     return (drawn == PFL_OK) ? PFL_OK : pfl_fault(f, drawn);
 }
 

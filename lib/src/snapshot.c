@@ -9,7 +9,7 @@
 
 #define SNAPSHOT_MAGIC 0x73706670u /* "pfps" */
 #define SNAPSHOT_VERSION 1u
-#define HEAD_WORDS 25u
+#define HEAD_WORDS 27u
 #define RNG_WORDS ((4u * PFL_RNG_LANES) + 4u)
 
 static size_t moment_words(size_t states)
@@ -93,7 +93,9 @@ static void head_of(const pfl_t *f, uint32_t head[HEAD_WORDS])
                                         f->quarantined,
                                         f->resets,
                                         f->overruns,
-                                        f->config->moments};
+                                        f->config->moments,
+                                        f->redrawn,
+                                        f->projected};
     memcpy(head, words, sizeof words);
 }
 
@@ -203,6 +205,8 @@ static void take_head(pfl_t *f, const unsigned char *at)
     f->quarantined = get_word(at + (4 * 21));
     f->resets = get_word(at + (4 * 22));
     f->overruns = get_word(at + (4 * 23));
+    f->redrawn = get_word(at + (4 * 25));
+    f->projected = get_word(at + (4 * 26));
     f->scratch_is_weights = 0u;
 }
 

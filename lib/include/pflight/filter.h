@@ -36,7 +36,7 @@ extern "C" {
 #define PFL_CEIL8(n) ((((size_t)(n)) + 7u) & ~(size_t)7u)
 #define PFL_MAX(a, b) (((a) > (b)) ? (a) : (b))
 #define PFL_CONTROL_BYTES 512u /* room for the control block, checked when the library is compiled */
-#define PFL_MOMENT_FLOATS(d) (PFL_CEIL8((3u * (size_t)(d)) + (((size_t)(d) * ((size_t)(d) + 1u)) / 2u)))
+#define PFL_MOMENT_FLOATS(d) (PFL_CEIL8((4u * (size_t)(d)) + ((size_t)(d) * ((size_t)(d) + 1u))))
 #define PFL_LANE_FLOATS(d) (8u * (2u + (3u * (size_t)(d)) + (((size_t)(d) * ((size_t)(d) + 1u)) / 2u)))
 #define PFL_WORK_FLOATS(d, q) ((size_t)PFL_BATCH * ((size_t)PFL_MAX(d, q) + 1u))
 
@@ -112,6 +112,34 @@ typedef enum {
     PFL_MOMENTS_MEAN = 1  /* weighted mean only: cheaper */
 } pfl_moments_t;
 
+/* inside[i] <- 1 where particle i is allowed, 0 where not. Pure; writes inside[0 .. n-1] only. */
+typedef void (*pfl_inside_fn)(void *user, const pfl_view_t *particles, uint32_t *inside);
+
+/* Brings particles that are outside to an allowed state, and leaves the others as they are. */
+typedef void (*pfl_project_fn)(void *user, const pfl_batch_t *particles);
+
+/* Keeps particles where the target can be (a road, above ground) by acceptance-rejection with a bound: a particle that
+ * a predict moved outside gets its noise drawn anew, `tries` draws in all; what is outside then is projected. A loop
+ * until everything is inside, as in the literature, need not end. */
+typedef struct {
+    pfl_inside_fn inside;   /* not null */
+    pfl_project_fn project; /* not null */
+    void *user;             /* handed to both; null: the configuration's */
+    uint32_t tries; /* 1 .. PFL_TRIES_MAX; 1 is constant time. More than 1 needs PFL_RETRY_BYTES(D) more arena */
+} pfl_constraint_t;
+
+#define PFL_TRIES_MAX 256u
+#define PFL_RETRY_BYTES(d) (8u * (size_t)PFL_BATCH * (size_t)(d))
+
+/* After each resampling, moves the copies apart without changing mean and covariance of the cloud (West 1993; Liu and
+ * West 2001): x <- a x + (1 - a) mean + b L n, a^2 + b^2 = 1, L L' the covariance of the resampled particles. For
+ * models whose own noise does not separate copies: parameters, biases, no noise at all. Needs PFL_MOMENTS_FULL.
+ * O(N D^2) in a step that resamples. */
+typedef struct {
+    float width;          /* b, 0 < b < 1; 0.1 .. 0.5 usual */
+    uint32_t states_mask; /* bit d set: state d takes part; 0: all do */
+} pfl_kernel_t;
+
 /* Constant while the filter lives; may be in flash. A zeroed field means what its comment says. */
 typedef struct {
     uint32_t abi;           /* PFL_ABI */
@@ -131,11 +159,13 @@ typedef struct {
     uint32_t budget_cycles; /* of the port's counter, for one filter cycle; 0: no budget */
     const float *lo, *hi;   /* state box: D floats each, lo < hi, infinities allowed; both null: no box. Particles are
                                 clipped to it after each predict */
-    const pfl_sensor_t *sensors; /* sensor_count of them */
-    pfl_predict_fn predict;      /* not null */
-    pfl_draw_fn draw;            /* null: pfl_init starts all particles at zero, and pfl_reset answers
+    const pfl_sensor_t *sensors;        /* sensor_count of them */
+    const pfl_constraint_t *constraint; /* null: none */
+    const pfl_kernel_t *kernel;         /* null: none */
+    pfl_predict_fn predict;             /* not null */
+    pfl_draw_fn draw;                   /* null: pfl_init starts all particles at zero, and pfl_reset answers
                                     PFL_ERR_NO_DRAW */
-    void *user;                  /* handed to predict and draw */
+    void *user;                         /* handed to predict and draw */
 } pfl_config_t;
 
 /* ---- A filter's life ---------------------------------------------------------------------------------------- */
@@ -208,6 +238,10 @@ float pfl_effective_sample_size(const pfl_t *f);
  * PFL_ERR_CORRUPT. O(1), O(N) with weights. */
 pfl_status_t pfl_particles(const pfl_t *f, pfl_view_t *view, float *log_weights);
 
+/* Largest distance of a particle from the point (x, y), in the plane of two states: the reach of the cloud. PFL_OK,
+ * PFL_ERR_ARG, PFL_ERR_CORRUPT. O(N). */
+pfl_status_t pfl_farthest(const pfl_t *f, uint16_t x_state, uint16_t y_state, float x, float y, float *distance);
+
 /* What a supervisor wants to know. Counters saturate. */
 typedef struct {
     uint64_t t_us;            /* the filter's time */
@@ -219,6 +253,8 @@ typedef struct {
     uint32_t faulted;         /* calls that ended in a fault: non-finite, log-likelihood > 0, self-call */
     uint32_t resampled;       /* resamplings */
     uint32_t quarantined;     /* particles that lost their weight to a non-finite state */
+    uint32_t redrawn;         /* draws beyond each particle's first, for the constraint */
+    uint32_t projected;       /* particles that the constraint had to project */
     uint32_t resets;          /* resets */
     uint32_t overruns;        /* filter cycles that spent their budget */
     uint32_t cycles_last;     /* counter cycles of the last or current filter cycle; 0 without a counter */

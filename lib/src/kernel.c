@@ -1,0 +1,83 @@
+/* The kernel step after resampling: copies move apart, mean and covariance stay. filter.h has the equation. */
+#include "core.h"
+
+#include "math_kernels.h"
+#include "sqrt_kernel.h"
+
+/* Position of element (d, e), d <= e, in an upper triangle stored row by row. */
+static size_t at(size_t states, size_t d, size_t e)
+{
+    return ((d * ((2u * states) - d + 1u)) / 2u) + (e - d);
+}
+
+static bool takes_part(const pfl_t *f, uint32_t d)
+{
+    const uint32_t mask = f->config->kernel->states_mask;
+    return (mask == 0u) || (((mask >> d) & 1u) != 0u);
+}
+
+/* Cholesky root of the covariance in place: C = U' U, U upper triangular. A state without spread of its own gets a row
+ * of zeros, so that a semi-definite matrix is no error. */
+static void root_in_place(const pfl_t *f, float *u)
+{
+    const uint32_t states = f->config->states;
+    for (uint32_t d = 0u; d < states; d++) {
+        const float whole = u[at(states, d, d)];
+        float rest = whole;
+        for (uint32_t k = 0u; k < d; k++) {
+            rest -= u[at(states, k, d)] * u[at(states, k, d)];
+        }
+        const bool spread = takes_part(f, d) && (rest > (whole * 1.0e-6f));
+        const float pivot = spread ? pfl_sqrt_kernel(rest) : 0.0f;
+        const float inverse = spread ? (1.0f / pivot) : 0.0f;
+        u[at(states, d, d)] = pivot;
+        for (uint32_t e = d + 1u; e < states; e++) {
+            float sum = u[at(states, d, e)];
+            for (uint32_t k = 0u; k < d; k++) {
+                sum -= u[at(states, k, d)] * u[at(states, k, e)];
+            }
+            u[at(states, d, e)] = takes_part(f, e) ? (sum * inverse) : 0.0f;
+        }
+    }
+}
+
+static void move_state(pfl_t *f, uint32_t d, uint32_t first, uint32_t n)
+{
+    const uint32_t states = f->config->states;
+    const float width = f->config->kernel->width;
+    const float pull = 1.0f - pfl_sqrt_kernel(1.0f - (width * width));
+    const float mean = f->kernel_mean[d];
+    const bool circular = ((f->config->circular_mask >> d) & 1u) != 0u;
+    float *restrict x = &f->x[((size_t)d * f->stride) + first];
+    for (uint32_t i = 0u; i < n; i++) {
+        const float back = mean - x[i];
+        x[i] += pull * (circular ? pfl_wrap_pi_kernel(back) : back);
+    }
+    for (uint32_t k = 0u; k <= d; k++) {
+        const float scale = width * f->kernel_cov[at(states, k, d)];
+        const float *restrict noise = &f->work[(size_t)k * PFL_BATCH];
+        for (uint32_t i = 0u; i < n; i++) {
+            x[i] += scale * noise[i];
+        }
+    }
+}
+
+void pfl_kernel_move(pfl_t *f)
+{
+    const uint32_t count = f->config->particles;
+    if (f->config->kernel == NULL) {
+        return;
+    }
+    pfl_cloud_moments(f, f->kernel_mean, f->kernel_cov);
+    root_in_place(f, f->kernel_cov);
+    for (uint32_t first = 0u; first < count; first += PFL_BATCH) {
+        const uint32_t n = ((count - first) < PFL_BATCH) ? (count - first) : PFL_BATCH;
+        pfl_make_noise(f, f->config->states, n);
+        for (uint32_t d = 0u; d < f->config->states; d++) {
+            if (takes_part(f, d)) {
+                move_state(f, d, first, n);
+            }
+        }
+        pfl_clip_to_box(f, first, n);
+    }
+}
