@@ -2,7 +2,8 @@
 # (PX4, ArduPilot, Zephyr, ESP-IDF) without its targets. No globs, so that a stray file never changes a build.
 #
 #   PFLIGHT_INCLUDE_DIR      the folder for -I
-#   PFLIGHT_LIB_SOURCES      absolute paths of the sources; drop the model_ and sensor_ files you do not use
+#   PFLIGHT_LIB_SOURCES      absolute paths of the sources; drop the model_, sensor_, constraint_ and guidance_ files
+#                            that you do not use
 #   PFLIGHT_LIB_HEADERS      absolute paths of the public headers
 #   PFLIGHT_COMPILE_OPTIONS  the flags that the results depend on: give them to the sources themselves
 #                            (target_compile_options(... PRIVATE ...)), so that they win over directory flags
@@ -33,21 +34,36 @@ set(PFLIGHT_LIB_SOURCES
   model_land_vehicle.c
   model_constant_velocity.c
   model_odometry.c
+  model_uav_autopilot.c
+  model_planar_uav.c
+  model_road_target.c
+  constraint_ring.c
+  guidance_lvfg.c
+  guidance_nmpc.c
   sensor_position.c
+  sensor_position_distance.c
   sensor_range.c
   sensor_range_bearing.c
+  model_coast.c
+  model_turn.c
+  sensor_coloured.c
+  sensor_velocity.c
+  guidance_waypoint.c
 )
 list(TRANSFORM PFLIGHT_LIB_SOURCES PREPEND "${CMAKE_CURRENT_LIST_DIR}/src/")
 
 set(PFLIGHT_LIB_HEADERS
   pflight.h
+  constraints.h
   filter.h
+  guidance.h
   math.h
   models.h
   port.h
   rng.h
   sensors.h
   status.h
+  waypoints.h
 )
 list(TRANSFORM PFLIGHT_LIB_HEADERS PREPEND "${PFLIGHT_INCLUDE_DIR}/pflight/")
 

@@ -20,18 +20,13 @@ static bool sensors_are_good(const pfl_config_t *c)
     return true;
 }
 
-static bool is_nan(float x)
-{
-    return ((uint32_t)pfl_bits(x) & 0x7FFFFFFFu) > 0x7F800000u;
-}
-
 static bool box_is_good(const pfl_config_t *c)
 {
     if ((c->lo == NULL) || (c->hi == NULL)) {
         return (c->lo == NULL) && (c->hi == NULL);
     }
     for (uint32_t d = 0u; d < c->states; d++) {
-        if (is_nan(c->lo[d]) || is_nan(c->hi[d]) || (c->lo[d] >= c->hi[d])) {
+        if (!pfl_is_not_nan(c->lo[d]) || !pfl_is_not_nan(c->hi[d]) || (c->lo[d] >= c->hi[d])) {
             return false;
         }
     }
@@ -50,13 +45,6 @@ static bool options_are_good(const pfl_config_t *c)
     return constraint && jitter;
 }
 
-/* Bytes for this configuration, retries of its constraint included. */
-size_t pfl_arena_bytes_of(const pfl_config_t *c)
-{
-    const size_t retry = ((c->constraint != NULL) && (c->constraint->tries > 1u)) ? PFL_RETRY_BYTES(c->states) : 0u;
-    return PFL_ARENA_BYTES(c->particles, c->states, c->noises) + retry;
-}
-
 bool pfl_config_is_good(const pfl_config_t *c)
 {
     const bool sizes = (c->particles >= 1u) && (c->particles <= PFL_PARTICLES_MAX) && (c->states >= 1u) &&
@@ -70,21 +58,32 @@ bool pfl_config_is_good(const pfl_config_t *c)
     return choices && ratio && sensors_are_good(c) && box_is_good(c) && options_are_good(c);
 }
 
+size_t pfl_arena_bytes(const pfl_config_t *config)
+{
+    if ((config == NULL) || !pfl_config_is_good(config)) {
+        return 0u;
+    }
+    const bool retries = (config->constraint != NULL) && (config->constraint->tries > 1u);
+    return PFL_ARENA_BYTES(config->particles, config->states, config->noises) +
+           (retries ? PFL_RETRY_BYTES(config->states) : 0u);
+}
+
 pfl_status_t pfl_lay_out(void *arena, size_t arena_bytes, const pfl_config_t *c, pfl_t **out)
 {
     const size_t d = c->states;
     const size_t stride = PFL_CEIL8(c->particles);
-    if ((arena == NULL) || (((uintptr_t)arena & 7u) != 0u) || (arena_bytes < pfl_arena_bytes_of(c))) {
+    if ((arena == NULL) || (((uintptr_t)arena & 7u) != 0u) || (arena_bytes < pfl_arena_bytes(c))) {
         return PFL_ERR_MEMORY;
     }
-    memset(arena, 0, pfl_arena_bytes_of(c));
+    memset(arena, 0, pfl_arena_bytes(c));
     pfl_t *f = (pfl_t *)arena;
     float *next = (float *)(void *)((unsigned char *)arena + PFL_CONTROL_BYTES);
     f->config = c;
     f->stride = (uint32_t)stride;
     f->mean = next;
     f->best = f->mean + d;
-    f->delta = f->best + d;
+    f->centre = f->best + d;
+    f->delta = f->centre + d;
     f->cov = f->delta + d;
     f->kernel_mean = f->cov + ((d * (d + 1u)) / 2u);
     f->kernel_cov = f->kernel_mean + d;
@@ -115,6 +114,12 @@ pfl_status_t pfl_enter(const pfl_t *f)
         return PFL_ERR_CORRUPT;
     }
     return (f->busy != 0u) ? PFL_ERR_BUSY : PFL_OK;
+}
+
+pfl_status_t pfl_begin(pfl_t *f)
+{
+    const pfl_status_t entered = pfl_enter(f);
+    return (entered == PFL_ERR_BUSY) ? pfl_fault(f, entered) : entered;
 }
 
 void pfl_count(uint32_t *counter, uint32_t more)

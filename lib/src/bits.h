@@ -46,4 +46,9 @@ static inline bool pfl_is_finite(float x)
     return ((uint32_t)pfl_bits(x) & 0x7F800000u) != 0x7F800000u;
 }
 
+static inline bool pfl_is_not_nan(float x)
+{
+    return ((uint32_t)pfl_bits(x) & 0x7FFFFFFFu) <= 0x7F800000u;
+}
+
 #endif

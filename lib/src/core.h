@@ -1,11 +1,11 @@
 /* What the files of the filter share: the control block at the front of the arena, and the steps of a cycle. Private
  * to lib/.
  *
- * Weights. A column of the arena holds log-weights s_i; particle i weighs exp(s_i - s_top), where s_top lies one
- * float above the largest s_i. An update writes the new log-weights to the other weight column ("scratch") and
- * commits by exchanging the two pointers, so a refused update leaves no trace. Every log-likelihood is taken less
- * PFL_LOGLIK_MAX first: a legal one is then strictly negative, NaN and positive ones stand out in a single integer
- * comparison, and the order of negative floats is the reverse order of their bits. */
+ * Weights. A column of the arena holds log-weights s_i; particle i weighs exp(s_i - s_top), s_top the largest s_i. An
+ * update writes the new log-weights to the other weight column ("scratch") and commits by exchanging the two pointers,
+ * so a refused update leaves no trace. Every log-likelihood is taken less a little more than PFL_LOGLIK_MAX first: a
+ * legal one is then strictly negative, NaN and positive ones stand out in a single integer comparison, and the order of
+ * negative floats is the reverse order of their bits. */
 #ifndef PFL_CORE_H
 #define PFL_CORE_H
 
@@ -16,6 +16,11 @@
 
 #define PFL_ALIVE 0x70666C79u /* "pfly": the arena holds a filter */
 #define PFL_GROUP 16u         /* particles in the first batch of a predict, which decides whether to go on */
+
+/* Of pfl.moments_current. */
+#define MOMENTS_STALE 0u
+#define MOMENTS_CURRENT 1u
+#define MOMENTS_OVERFLOWED 2u /* beyond single precision; mean and cov hold finite stand-ins */
 
 /* Cycle counting of one filter cycle: differences are taken at every batch, so that a narrow counter may wrap. */
 typedef struct {
@@ -30,24 +35,26 @@ struct pfl {
     const pfl_config_t *config;
     uint64_t t_us;
     uint32_t stride;
-    float *mean;        /* D */
-    float *best;        /* D: state of the most likely particle */
-    float *delta;       /* D: jump of the mean at the last reset */
-    float *cov;         /* D (D + 1) / 2, upper triangle row by row */
-    float *kernel_mean; /* D: mean of the resampled cloud */
-    float *kernel_cov;  /* D (D + 1) / 2: its covariance, then the root of it */
-    float *lanes;       /* eight partial sums of each moment; saved particles during a predict */
-    float *work;        /* PFL_BATCH x (max(D, Q) + 1) */
-    float *x;           /* D columns of `stride` */
-    float *log_weight;  /* column */
-    float *scratch;     /* column */
-    float *retry;       /* PFL_BATCH x 2 D: a batch before its move, and a new attempt; null without retries */
+    float *mean;         /* D */
+    float *best;         /* D: state of the most likely particle */
+    float *centre;       /* D: what moments are taken about */
+    uint32_t best_index; /* the most likely particle's */
+    float *delta;        /* D: jump of the mean at the last reset */
+    float *cov;          /* D (D + 1) / 2, upper triangle row by row */
+    float *kernel_mean;  /* D: mean of the resampled cloud */
+    float *kernel_cov;   /* D (D + 1) / 2: its covariance, then the root of it */
+    float *lanes;        /* eight partial sums of each moment; saved particles during a predict */
+    float *work;         /* PFL_BATCH x (max(D, Q) + 1) */
+    float *x;            /* D columns of `stride` */
+    float *log_weight;   /* column */
+    float *scratch;      /* column */
+    float *retry;        /* PFL_BATCH x 2 D: a batch before its move, and a new attempt; null without retries */
     float log_weight_top;
     float weight_sum; /* of the weights that `scratch` holds, if it does */
     float test_ratio;
     float ess;
     uint32_t scratch_is_weights; /* scratch[i] = weight i, current */
-    uint32_t moments_current;    /* mean, cov belong to the filter's time */
+    uint32_t moments_current;    /* mean, cov belong to the filter's time: MOMENTS_ */
     uint32_t resample_pending;   /* put off by the budget */
     uint64_t reset_t_us;
     uint64_t t_fused_us;
@@ -61,10 +68,10 @@ struct pfl {
 
 /* arena.c */
 bool pfl_config_is_good(const pfl_config_t *c);
-size_t pfl_arena_bytes_of(const pfl_config_t *c);
 pfl_status_t pfl_lay_out(void *arena, size_t arena_bytes, const pfl_config_t *c, pfl_t **out);
 bool pfl_is_alive(const pfl_t *f);
-pfl_status_t pfl_enter(const pfl_t *f);                /* PFL_OK, or why a call on f cannot start */
+pfl_status_t pfl_enter(const pfl_t *f); /* PFL_OK, or why a call on f cannot start */
+pfl_status_t pfl_begin(pfl_t *f);       /* the same, and a call from inside a callback is counted as a fault */
 pfl_status_t pfl_fault(pfl_t *f, pfl_status_t status); /* counts a fault, tells the port, returns the status */
 
 void pfl_count(uint32_t *counter, uint32_t more); /* adds, and stays at the end of its range */
@@ -96,6 +103,7 @@ typedef struct {
 void pfl_weigh_start(pfl_weigh_t *w);
 void pfl_weigh_batch(const pfl_t *f, uint32_t first, uint32_t n, float *ll, pfl_weigh_t *w);
 void pfl_weights_equal(pfl_t *f);
+void pfl_weights_after_loss(pfl_t *f); /* some particles lost theirs: a new top, or equal ones if none is left */
 
 /* moments.c */
 void pfl_set_best(pfl_t *f, uint32_t first);
@@ -106,6 +114,7 @@ void pfl_weights(pfl_t *f); /* only the weights, into the scratch column, where 
 
 /* resample.c */
 void pfl_resample_now(pfl_t *f);
+bool pfl_resample_is_due(const pfl_t *f);
 
 /* meter.c */
 void pfl_meter_begin(pfl_t *f);    /* of a filter cycle */

@@ -6,7 +6,7 @@
 
 pfl_status_t pfl_estimate(pfl_t *f, float *mean, float *cov)
 {
-    const pfl_status_t entered = pfl_enter(f);
+    const pfl_status_t entered = pfl_begin(f);
     if (entered != PFL_OK) {
         return entered;
     }
@@ -18,15 +18,7 @@ pfl_status_t pfl_estimate(pfl_t *f, float *mean, float *cov)
         return PFL_ERR_CONFIG;
     }
     pfl_refresh(f);
-    const uint32_t terms = (cov != NULL) ? ((states * (states + 1u)) / 2u) : 0u;
-    float sum = 0.0f;
-    for (uint32_t d = 0u; d < states; d++) {
-        sum += f->mean[d] * 0.0f;
-    }
-    for (uint32_t k = 0u; k < terms; k++) {
-        sum += f->cov[k] * 0.0f;
-    }
-    if (!pfl_is_finite(sum)) {
+    if (f->moments_current == MOMENTS_OVERFLOWED) {
         return pfl_fault(f, PFL_ERR_NONFINITE);
     }
     memcpy(mean, f->mean, sizeof(float) * states);
@@ -124,7 +116,7 @@ static uint64_t weight_up_to(const pfl_t *f, const float *x, uint32_t key)
 
 pfl_status_t pfl_quantile(pfl_t *f, uint16_t state, float p, float *value)
 {
-    const pfl_status_t entered = pfl_enter(f);
+    const pfl_status_t entered = pfl_begin(f);
     if (entered != PFL_OK) {
         return entered;
     }
@@ -202,7 +194,7 @@ bool pfl_invariants_hold(const pfl_t *f)
     }
     for (uint32_t i = 0u; i < count; i++) {
         const float relative = f->log_weight[i] - f->log_weight_top;
-        hold = hold && (pfl_bits(relative) < 0) && ((uint32_t)pfl_bits(relative) <= 0xFF800000u);
+        hold = hold && (relative <= 0.0f) && pfl_is_not_nan(relative);
     }
     return hold;
 }

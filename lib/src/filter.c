@@ -22,6 +22,7 @@ pfl_status_t pfl_draw_prior(pfl_t *f)
         }
         pfl_clip_to_box(f, first, n);
     }
+    f->best_index = 0u;
     for (uint32_t d = 0u; d < f->config->states; d++) {
         f->best[d] = f->x[(size_t)d * f->stride];
     }
@@ -67,7 +68,7 @@ pfl_status_t pfl_init(void *arena, size_t arena_bytes, const pfl_config_t *confi
 
 pfl_status_t pfl_predict(pfl_t *f, uint64_t t_us, const void *u)
 {
-    const pfl_status_t entered = pfl_enter(f);
+    const pfl_status_t entered = pfl_begin(f);
     if (entered != PFL_OK) {
         return entered;
     }
@@ -138,7 +139,7 @@ static void commit(pfl_t *f, const pfl_weigh_t *w)
     float *old = f->log_weight;
     f->log_weight = f->scratch;
     f->scratch = old;
-    f->log_weight_top = pfl_from_bits(w->top_bits - 1);
+    f->log_weight_top = pfl_from_bits(w->top_bits);
     pfl_count(&f->fused, 1u);
     f->t_fused_us = f->t_us;
     pfl_set_best(f, w->top_first);
@@ -160,7 +161,7 @@ static pfl_status_t fuse(pfl_t *f, const pfl_sensor_t *sensor, const void *z)
         f->resample_pending = 1u;
         return PFL_DEFERRED;
     }
-    if (f->ess < (f->config->ess_ratio * (float)f->config->particles)) {
+    if (pfl_resample_is_due(f)) {
         if (pfl_meter_spent(f)) {
             f->resample_pending = 1u;
             return PFL_DEFERRED;
@@ -172,7 +173,7 @@ static pfl_status_t fuse(pfl_t *f, const pfl_sensor_t *sensor, const void *z)
 
 pfl_status_t pfl_update(pfl_t *f, uint16_t sensor, uint64_t t_us, const void *z)
 {
-    const pfl_status_t entered = pfl_enter(f);
+    const pfl_status_t entered = pfl_begin(f);
     if (entered != PFL_OK) {
         return entered;
     }
@@ -193,7 +194,7 @@ pfl_status_t pfl_update(pfl_t *f, uint16_t sensor, uint64_t t_us, const void *z)
 
 pfl_status_t pfl_resample(pfl_t *f)
 {
-    const pfl_status_t entered = pfl_enter(f);
+    const pfl_status_t entered = pfl_begin(f);
     if (entered != PFL_OK) {
         return entered;
     }

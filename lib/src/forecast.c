@@ -17,7 +17,7 @@ pfl_status_t pfl_fork(const pfl_t *f, void *arena, size_t arena_bytes, pfl_t **o
         return entered;
     }
     const pfl_config_t *c = f->config;
-    const size_t bytes = pfl_arena_bytes_of(c);
+    const size_t bytes = pfl_arena_bytes(c);
     if ((arena == (const void *)f) || (arena == NULL) || (((uintptr_t)arena & 7u) != 0u) || (arena_bytes < bytes)) {
         return PFL_ERR_MEMORY;
     }
@@ -25,6 +25,7 @@ pfl_status_t pfl_fork(const pfl_t *f, void *arena, size_t arena_bytes, pfl_t **o
     pfl_t *copy = (pfl_t *)arena;
     copy->mean = moved(f->mean, f, copy);
     copy->best = moved(f->best, f, copy);
+    copy->centre = moved(f->centre, f, copy);
     copy->delta = moved(f->delta, f, copy);
     copy->cov = moved(f->cov, f, copy);
     copy->lanes = moved(f->lanes, f, copy);
@@ -43,6 +44,9 @@ pfl_status_t pfl_fork(const pfl_t *f, void *arena, size_t arena_bytes, pfl_t **o
 pfl_status_t pfl_forecast(const pfl_t *f, void *arena, size_t arena_bytes, const pfl_horizon_t *horizon, float *mean,
                           float *cov, pfl_t **out)
 {
+    if (out != NULL) {
+        *out = NULL;
+    }
     if ((horizon == NULL) || (mean == NULL) || (horizon->step_us == 0u) || (horizon->steps == 0u)) {
         return PFL_ERR_ARG;
     }

@@ -46,7 +46,7 @@ static inline float pfl_exp_kernel(float x)
 /* log(m 2^e) for positive normal m 2^e, no special cases. */
 static inline float pfl_log_positive_kernel(float x)
 {
-    const int32_t i = pfl_bits(x) - 0x3F3504F3; /* m in [sqrt(1/2), sqrt(2)) */
+    const int32_t i = (int32_t)((uint32_t)pfl_bits(x) - 0x3F3504F3u); /* m in [sqrt(1/2), sqrt(2)) */
     const float e = (float)(i >> 23);
     const float t = pfl_from_bits((i & 0x007FFFFF) + 0x3F3504F3) - 1.0f;
     float p = -7.63449371e-2f; /* log(1+t) = t - t^2/2 + t^3 P(t), 5.8e-9 */
@@ -79,8 +79,8 @@ static inline void pfl_sincos_kernel(float x, float *s, float *c)
     const float biased = (x * 0.636619772f) + PFL_ROUND_MAGIC;
     const float kf = biased - PFL_ROUND_MAGIC;
     const int32_t k = pfl_bits(biased);
-    /* pi/2 in parts of 14, 14 and 24 bits (Cody and Waite 1980): two exact products up to |k| = 1024 */
-    const float r = ((x - (kf * 1.5706787109375f)) - (kf * 1.17614865e-4f)) - (kf * 9.9209358e-10f);
+    /* pi/2 in parts (Cody and Waite 1980); the first, rounded up, and the second are exact up to |k| = 1024 */
+    const float r = ((x - (kf * 1.57080078125f)) + (kf * 4.45451587e-6f)) - (kf * 6.07710063e-11f);
     const float r2 = r * r;
     float ps = -1.95149580e-4f; /* sin r = r + r^3 P(r^2), 3.8e-9 */
     ps = (ps * r2) + 8.33215844e-3f;
@@ -93,7 +93,7 @@ static inline void pfl_sincos_kernel(float x, float *s, float *c)
     const int32_t swap = -(k & 1); /* odd quadrant: sine and cosine change places */
     const int32_t change = (pfl_bits(sr) ^ pfl_bits(cr)) & swap;
     const int32_t s_sign = (int32_t)((uint32_t)k << 30) & (int32_t)0x80000000u;
-    const int32_t c_sign = (int32_t)((uint32_t)(k + 1) << 30) & (int32_t)0x80000000u;
+    const int32_t c_sign = (int32_t)(((uint32_t)k + 1u) << 30) & (int32_t)0x80000000u;
     *s = pfl_from_bits((pfl_bits(sr) ^ change) ^ s_sign);
     *c = pfl_from_bits((pfl_bits(cr) ^ change) ^ c_sign);
 }

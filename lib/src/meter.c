@@ -33,9 +33,9 @@ uint32_t pfl_meter_read(pfl_t *f)
 
 void pfl_meter_pause(pfl_t *f)
 {
-    const uint32_t used = pfl_meter_read(f);
-    f->cycles_max = (used > f->cycles_max) ? used : f->cycles_max;
+    (void)pfl_meter_read(f);
     (void)pfl_meter_spent(f);
+    f->cycles_max = (f->meter.used > f->cycles_max) ? f->meter.used : f->cycles_max;
 }
 
 bool pfl_meter_spent(pfl_t *f)

@@ -97,7 +97,7 @@ pfl_batch_t pfl_batch_at(pfl_t *f, uint32_t first, uint32_t n)
 typedef char pfl_spare_column_fits[(sizeof(pfl_rng_t) <= (sizeof(float) * PFL_BATCH)) ? 1 : -1];
 
 /* The first group of a step, which can be undone: saved, moved, and put back when nothing finite came out. */
-static bool first_group_survives(pfl_t *f, const void *u, float dt_s, uint32_t n)
+static bool first_group_survives(pfl_t *f, const void *u, float dt_s, uint32_t n, bool rehearsal)
 {
     const uint32_t states = f->config->states;
     float *spare = &f->work[PFL_WORK_FLOATS(states, f->config->noises) - PFL_BATCH]; /* the column no noise uses */
@@ -108,14 +108,15 @@ static bool first_group_survives(pfl_t *f, const void *u, float dt_s, uint32_t n
     const pfl_batch_t batch = pfl_batch_at(f, 0u, n);
     pfl_make_noise(f, f->config->noises, n);
     f->config->predict(f->config->user, u, dt_s, &batch);
-    if (pfl_count_nonfinite(f, 0u, n) < n) {
+    const bool survives = pfl_count_nonfinite(f, 0u, n) < n;
+    if (survives && !rehearsal) {
         return true;
     }
     for (uint32_t d = 0u; d < states; d++) {
         memcpy(&f->x[(size_t)d * f->stride], &f->lanes[(size_t)d * PFL_GROUP], sizeof(float) * n);
     }
     memcpy(&f->rng, spare, sizeof f->rng);
-    return false;
+    return survives;
 }
 
 /* One model step for all particles; *lost grows by those quarantined. */
@@ -125,7 +126,7 @@ static pfl_status_t step(pfl_t *f, const void *u, float dt_s, bool undoable, uin
     uint32_t n = (count < PFL_GROUP) ? count : PFL_GROUP;
     uint32_t first = 0u;
     pfl_constraint_save(f, first, n);
-    if (undoable && !first_group_survives(f, u, dt_s, n)) {
+    if (undoable && !first_group_survives(f, u, dt_s, n, false)) {
         return PFL_ERR_NONFINITE;
     }
     while (first < count) {
@@ -146,16 +147,21 @@ static pfl_status_t step(pfl_t *f, const void *u, float dt_s, bool undoable, uin
     return PFL_OK;
 }
 
-/* What the budget put off in the cycle before is done first. */
-static void catch_up(pfl_t *f)
+/* What the budget put off in the cycle before is done first, so that a filter that was cut short goes on with the same
+ * bits as one that was not; but not before a rehearsal has shown that the model works, after which nothing could be
+ * undone. */
+static pfl_status_t catch_up(pfl_t *f, const void *u, float dt_s)
 {
-    if (f->resample_pending != 0u) {
-        (void)pfl_moments(f, false);
-        if (f->ess < (f->config->ess_ratio * (float)f->config->particles)) {
-            pfl_resample_now(f);
-        }
-        f->resample_pending = 0u;
+    const uint32_t count = f->config->particles;
+    if (!first_group_survives(f, u, dt_s, (count < PFL_GROUP) ? count : PFL_GROUP, true)) {
+        return PFL_ERR_NONFINITE;
     }
+    (void)pfl_moments(f, false);
+    if (pfl_resample_is_due(f)) {
+        pfl_resample_now(f);
+    }
+    f->resample_pending = 0u;
+    return PFL_OK;
 }
 
 pfl_status_t pfl_propagate(pfl_t *f, uint32_t dt_us, const void *u)
@@ -165,21 +171,24 @@ pfl_status_t pfl_propagate(pfl_t *f, uint32_t dt_us, const void *u)
     if (pieces > PFL_SUBSTEPS_MAX) {
         return PFL_ERR_GAP;
     }
-    catch_up(f);
+    const bool pending = f->resample_pending != 0u;
     uint32_t lost = 0u;
     uint32_t left_us = dt_us;
     f->busy = 1u;
-    for (uint32_t k = pieces; k > 0u; k--) {
+    pfl_status_t moved = pending ? catch_up(f, u, (float)(dt_us / pieces) * 1.0e-6f) : PFL_OK;
+    for (uint32_t k = pieces; (k > 0u) && (moved == PFL_OK); k--) {
         const uint32_t piece_us = left_us / k;
-        const pfl_status_t moved = step(f, u, (float)piece_us * 1.0e-6f, k == pieces, &lost);
-        if (moved != PFL_OK) {
-            f->busy = 0u;
-            return pfl_fault(f, moved);
-        }
+        moved = step(f, u, (float)piece_us * 1.0e-6f, (k == pieces) && !pending, &lost);
         left_us -= piece_us;
     }
     f->busy = 0u;
+    if (moved != PFL_OK) {
+        return pfl_fault(f, moved);
+    }
     f->t_us += dt_us;
-    f->moments_current = 0u;
+    f->moments_current = MOMENTS_STALE;
+    if (lost != 0u) {
+        pfl_weights_after_loss(f);
+    }
     return (lost == 0u) ? PFL_OK : pfl_fault(f, PFL_QUARANTINED);
 }

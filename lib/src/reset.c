@@ -18,7 +18,7 @@ static void gather_at_mean(pfl_t *f, const float *mean)
 
 pfl_status_t pfl_reset(pfl_t *f, uint64_t t_us)
 {
-    const pfl_status_t entered = pfl_enter(f);
+    const pfl_status_t entered = pfl_begin(f);
     if (entered != PFL_OK) {
         return entered;
     }

@@ -9,7 +9,7 @@
 
 #define SNAPSHOT_MAGIC 0x73706670u /* "pfps" */
 #define SNAPSHOT_VERSION 1u
-#define HEAD_WORDS 27u
+#define HEAD_WORDS 28u
 #define RNG_WORDS ((4u * PFL_RNG_LANES) + 4u)
 
 static size_t moment_words(size_t states)
@@ -95,7 +95,8 @@ static void head_of(const pfl_t *f, uint32_t head[HEAD_WORDS])
                                         f->overruns,
                                         f->config->moments,
                                         f->redrawn,
-                                        f->projected};
+                                        f->projected,
+                                        f->best_index};
     memcpy(head, words, sizeof words);
 }
 
@@ -152,7 +153,8 @@ static bool head_fits(const pfl_t *f, const unsigned char *at)
                        (get_word(at + 16) == f->config->noises) && (get_word(at + (4 * 24)) == f->config->moments);
     const bool numbers = pfl_is_finite(top) && pfl_is_finite(sum) && pfl_is_finite(ratio) && pfl_is_finite(ess);
     return shape && numbers && (sum > 0.0f) && (ess >= 1.0f) && (ess <= (float)f->config->particles) &&
-           (get_word(at + (4 * 15)) <= 1u) && (get_word(at + (4 * 16)) <= 1u);
+           (get_word(at + (4 * 15)) <= MOMENTS_OVERFLOWED) && (get_word(at + (4 * 16)) <= 1u) &&
+           (get_word(at + (4 * 27)) < f->config->particles);
 }
 
 /* Streams alive, moments and states finite, log-weights below their top. */
@@ -175,8 +177,8 @@ static bool body_is_good(const pfl_t *f, const unsigned char *at)
         next += 4;
     }
     for (uint32_t i = 0u; i < f->config->particles; i++) {
-        const int32_t bits = pfl_bits(pfl_from_bits((int32_t)get_word(next)) - top);
-        good = good && (bits < 0) && ((uint32_t)bits <= 0xFF800000u);
+        const float relative = pfl_from_bits((int32_t)get_word(next)) - top;
+        good = good && pfl_is_not_nan(relative) && (relative <= 0.0f);
         next += 4;
     }
     return good;
@@ -207,12 +209,13 @@ static void take_head(pfl_t *f, const unsigned char *at)
     f->overruns = get_word(at + (4 * 23));
     f->redrawn = get_word(at + (4 * 25));
     f->projected = get_word(at + (4 * 26));
+    f->best_index = get_word(at + (4 * 27));
     f->scratch_is_weights = 0u;
 }
 
 pfl_status_t pfl_restore(pfl_t *f, const void *buffer, size_t buffer_bytes)
 {
-    const pfl_status_t entered = pfl_enter(f);
+    const pfl_status_t entered = pfl_begin(f);
     if (entered != PFL_OK) {
         return entered;
     }

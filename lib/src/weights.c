@@ -4,6 +4,9 @@
 
 #include <limits.h>
 
+/* A little more than PFL_LOGLIK_MAX, which itself is legal: what remains of a legal log-likelihood is below zero. */
+#define LOGLIK_SHIFT 0.00097656262f
+
 void pfl_weigh_start(pfl_weigh_t *w)
 {
     w->worst_bits = INT32_MIN;
@@ -20,7 +23,7 @@ void pfl_weigh_batch(const pfl_t *f, uint32_t first, uint32_t n, float *ll, pfl_
     int32_t best = w->best_bits;
     int32_t top = INT32_MAX;
     for (uint32_t i = 0u; i < n; i++) {
-        const float y = ll[i] - PFL_LOGLIK_MAX;
+        const float y = ll[i] - LOGLIK_SHIFT;
         const float s = (old[i] - old_top) + y;
         const int32_t y_bits = pfl_bits(y);
         const int32_t s_bits = pfl_bits(s);
@@ -42,6 +45,22 @@ void pfl_weights_equal(pfl_t *f)
     for (uint32_t i = 0u; i < f->stride; i++) {
         f->log_weight[i] = 0.0f;
     }
-    f->log_weight_top = FLT_MIN; /* the smallest normal above 0 */
+    f->log_weight_top = 0.0f;
     f->scratch_is_weights = 0u;
+}
+
+void pfl_weights_after_loss(pfl_t *f)
+{
+    const uint32_t count = f->config->particles;
+    uint32_t best = 0u;
+    for (uint32_t i = 1u; i < count; i++) {
+        best = (f->log_weight[i] > f->log_weight[best]) ? i : best;
+    }
+    f->best_index = best;
+    f->scratch_is_weights = 0u;
+    if (pfl_is_finite(f->log_weight[best])) {
+        f->log_weight_top = f->log_weight[best];
+    } else {
+        pfl_weights_equal(f);
+    }
 }

@@ -36,7 +36,7 @@ extern "C" {
 #define PFL_CEIL8(n) ((((size_t)(n)) + 7u) & ~(size_t)7u)
 #define PFL_MAX(a, b) (((a) > (b)) ? (a) : (b))
 #define PFL_CONTROL_BYTES 512u /* room for the control block, checked when the library is compiled */
-#define PFL_MOMENT_FLOATS(d) (PFL_CEIL8((4u * (size_t)(d)) + ((size_t)(d) * ((size_t)(d) + 1u))))
+#define PFL_MOMENT_FLOATS(d) (PFL_CEIL8((5u * (size_t)(d)) + ((size_t)(d) * ((size_t)(d) + 1u))))
 #define PFL_LANE_FLOATS(d) (8u * (2u + (3u * (size_t)(d)) + (((size_t)(d) * ((size_t)(d) + 1u)) / 2u)))
 #define PFL_WORK_FLOATS(d, q) ((size_t)PFL_BATCH * ((size_t)PFL_MAX(d, q) + 1u))
 
@@ -173,8 +173,12 @@ typedef struct {
 /* A filter; it lives at the front of its arena. */
 typedef struct pfl pfl_t;
 
+/* Bytes of arena that a configuration needs: PFL_ARENA_BYTES, and what its constraint adds. 0 for null or a
+ * configuration that pfl_init would refuse. O(D + sensors). */
+size_t pfl_arena_bytes(const pfl_config_t *config);
+
 /* Builds a filter in the caller's arena and draws its particles.
- * arena: aligned to 8, at least PFL_ARENA_BYTES(N, D, Q); owned by the caller, untouched by him while the filter
+ * arena: aligned to 8, at least pfl_arena_bytes(config); owned by the caller, untouched by him while the filter
  * lives. config, its arrays and user data outlive the filter. t_us: time of the prior. *out: the filter, or null.
  * PFL_OK, PFL_ERR_ARG, PFL_ERR_MEMORY, PFL_ERR_CONFIG, PFL_ERR_ABI, PFL_ERR_NONFINITE (from draw). On an error no
  * filter is there, and nothing outside the arena was written; before the arena is known to be good nothing inside
@@ -250,7 +254,7 @@ typedef struct {
     float test_ratio;         /* of the last update: -2 max ll / gate; > 1 rejected, < 0.5 normal; 0 without gate */
     uint32_t fused;           /* measurements fused */
     uint32_t rejected;        /* measurements answered PFL_REJECTED */
-    uint32_t faulted;         /* calls that ended in a fault: non-finite, log-likelihood > 0, self-call */
+    uint32_t faulted;         /* calls that ended in a fault: non-finite, log-likelihood > 0, budget, self-call */
     uint32_t resampled;       /* resamplings */
     uint32_t quarantined;     /* particles that lost their weight to a non-finite state */
     uint32_t redrawn;         /* draws beyond each particle's first, for the constraint */
@@ -300,7 +304,7 @@ size_t pfl_snapshot_bytes(const pfl_t *f);
  * PFL_OK, PFL_ERR_MEMORY (buffer too small), PFL_ERR_BUSY, PFL_ERR_ARG, PFL_ERR_CORRUPT. O(N D). */
 pfl_status_t pfl_snapshot(const pfl_t *f, void *buffer, size_t buffer_bytes);
 
-/* Brings a filter, built with the same N, D and Q, to a snapshot's state, on this or another machine.
+/* Brings a filter, built with the same N, D, Q and moments, to a snapshot's state, on this or another machine.
  * PFL_OK, PFL_ERR_CORRUPT (truncated, damaged, another version or shape), PFL_ERR_BUSY, PFL_ERR_ARG: unchanged.
  * O(N D). */
 pfl_status_t pfl_restore(pfl_t *f, const void *buffer, size_t buffer_bytes);

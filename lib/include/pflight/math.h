@@ -34,7 +34,8 @@ float pfl_atan2f(float y, float x);
 /* Correctly rounded square root; NaN for x < 0. */
 float pfl_sqrtf(float x);
 
-/* x less the multiple of 2 pi that brings it to [-pi, pi], |x| <= 6400: the absolute error is at most 4e-7. */
+/* x less the multiple of 2 pi that brings it to [-pi, pi]. For |x| <= 6400 the absolute error is at most 4e-7; the
+ * result may lie outside by up to 9e-8 for |x| <= 10, and by up to 5e-4 at the end of the range. */
 float pfl_wrap_pi(float x);
 
 /* The same over n elements: faster, where the compiler has vectors. In and out may be the same array, s and c not. */

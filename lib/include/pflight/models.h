@@ -4,6 +4,7 @@
 #define PFLIGHT_MODELS_H
 
 #include "pflight/filter.h"
+#include "pflight/waypoints.h"
 
 #ifdef __cplusplus
 extern "C" {
@@ -73,6 +74,150 @@ typedef struct {
 } pfl_odometry_input_t;
 
 void pfl_odometry_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p);
+
+/* ---- A target on a ring road ------------------------------------------------------------------------------------ */
+/* States as those of constant velocity: x, y [m], vx, vy [m/s]; Q = 2; u: not used. Both models turn the velocity with
+ * the road and never leave it, so they need no constraint. Accelerations as there: sigma w / sqrt(dt), held over the
+ * step. With r the distance from the center, th the angle there, vr and vt the speeds outwards and along: */
+
+/* r += dt vr + dt^2/2 a0, vr += dt a0, th += (dt vt + dt^2/2 a1) / r, vt += dt a1; r clipped to the road, where vr loses
+ * what points off it. */
+typedef struct {
+    float center_x_m, center_y_m;
+    float inner_m, outer_m; /* 0 < inner_m < outer_m */
+    float sigma_across;     /* of a0 [m/s^2/sqrt(Hz)] */
+    float sigma_along;      /* of a1 */
+} pfl_road_target_t;
+
+void pfl_road_target_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p);
+
+/* Follows the center line: V = vt radius_m / r is the speed on it, V += dt a1, th += dt (V_old + V) / (2 radius_m). The
+ * offset r - radius_m is coloured noise (first order, stationary) and clipped to the road; no speed is kept for it. */
+typedef struct {
+    float center_x_m, center_y_m;
+    float radius_m;                     /* of the center line */
+    float half_width_m;                 /* < radius_m */
+    float sigma_along;                  /* of a1 [m/s^2/sqrt(Hz)] */
+    float sigma_offset_m;               /* of the offset */
+    float offset_time_s;                /* its correlation time, > 0 */
+    float speed_min_mps, speed_max_mps; /* V is clipped to them; infinities for none */
+} pfl_lane_target_t;
+
+void pfl_lane_target_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p);
+
+/* ---- UAV in the plane whose speed and turn rate follow commands with a lag --------------------------------------- */
+/* States: x [m], y [m], heading [rad, not wrapped], speed [m/s], turn rate [rad/s].
+ *     x' = v cos psi, y' = v sin psi, psi' = om, v' = (command - v) / lag, om' likewise
+ * The lags are exact and the way is integrated in pieces by the midpoint rule; or all by one forward Euler step. Q = 2,
+ * a random walk on speed and turn rate; Q = 0 where both sigmas are zero. */
+enum { PFL_UAV_X = 0, PFL_UAV_Y = 1, PFL_UAV_HEADING = 2, PFL_UAV_SPEED = 3, PFL_UAV_TURN = 4, PFL_UAV_STATES = 5 };
+
+#define PFL_UAV_PIECES_MAX 64u
+
+typedef struct {
+    float lag_s;       /* > 0 */
+    uint32_t pieces;   /* of a step, at most PFL_UAV_PIECES_MAX; 0: forward Euler */
+    float sigma_speed; /* [m/s/sqrt(s)] */
+    float sigma_turn;  /* [rad/s/sqrt(s)] */
+} pfl_planar_uav_t;
+
+/* u of the UAV: its commands. Limits are the caller's. */
+typedef struct {
+    float speed_mps;
+    float turn_radps; /* from x to y positive */
+} pfl_planar_uav_input_t;
+
+void pfl_planar_uav_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p);
+
+/* ---- UAV under its autopilot: loops for speed, heading and height, in wind (McLain and Beard 2005) --------------- */
+/* States: x [m], y [m], height [m], airspeed [m/s], heading from x [rad, not wrapped], climb rate [m/s]; then, where
+ * the parameters say so, the wind (x, y) [m/s] and the index of the waypoint steered for. Explicit Euler in `substeps`
+ * equal pieces of the step, each all from its old state, D the piece's length:
+ *     x += D (v cos psi + w_x)      psi += D clip(alpha_heading (psi_c - psi), -turn_max, turn_max)
+ *     y += D (v sin psi + w_y)      v = clip(v + D alpha_speed (v_c - v), speed_min, speed_max)
+ *     h += D climb                  climb += D (alpha_height (h_c - h) - alpha_climb climb)
+ * The wind is w = wind + sigma_gust n, drawn for each particle once a step and held over it: the step is the gust's
+ * period. Wind in the states then walks by wind_walk sqrt(dt) n; it is unknown, and copied by resampling with the
+ * rest. Q = 2; Q = 4 with wind in the states. user: pfl_autopilot_t, u: pfl_autopilot_input_t. Stack: 1.6 KB. */
+enum {
+    PFL_AUTOPILOT_X = 0,
+    PFL_AUTOPILOT_Y = 1,
+    PFL_AUTOPILOT_HEIGHT = 2,
+    PFL_AUTOPILOT_SPEED = 3,
+    PFL_AUTOPILOT_HEADING = 4,
+    PFL_AUTOPILOT_CLIMB = 5,
+    PFL_AUTOPILOT_STATES = 6
+};
+
+typedef struct {
+    float alpha_speed;       /* bandwidth of the speed loop [1/s] */
+    float alpha_heading;     /* and of the heading loop [1/s] */
+    float alpha_height;      /* spring of the height loop [1/s^2] */
+    float alpha_climb;       /* and its damping [1/s] */
+    float speed_min_mps;     /* < speed_max_mps */
+    float speed_max_mps;     /* infinity: no limit */
+    float turn_max_radps;    /* > 0; infinity: no limit */
+    float wind_x_mps;        /* the known part of the wind, added to the states' */
+    float wind_y_mps;        /* towards y */
+    float sigma_gust_mps;    /* standard deviation of each component, about the mean */
+    float wind_walk;         /* random walk of the wind in the states [m/s/sqrt(s)] */
+    uint16_t substeps;       /* 0: as 1 */
+    uint16_t wind_state;     /* index of the first of two states for the wind; 0: none */
+    uint16_t waypoint_state; /* index of the state for the waypoint's index; 0: none */
+} pfl_autopilot_t;
+
+/* u of the UAV: what its pilot asks for, from the beginning of the step on. */
+typedef struct {
+    float speed_mps;
+    float height_m;
+    float heading_rad;        /* wanted at the beginning of the step: constant, or for a circle */
+    float turn_radps;         /* and how fast it turns */
+    const pfl_route_t *route; /* not null, with a waypoint state: straight to the waypoints, switching before each
+                                 piece, and the two above are not used. Bearings are wrapped */
+} pfl_autopilot_input_t;
+
+void pfl_autopilot_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p);
+
+/* ---- Constant velocity on 1 .. 3 axes, without noise ------------------------------------------------------------- */
+/* With A axes: states 0 .. A-1 are positions [m], A .. 2A-1 velocities [m/s]: p += dt v. Where `remember` is not 0,
+ * states 2A .. 3A-1 become the positions before the step, for pfl_coloured_loglik. Q = 0. Nothing here moves the copies
+ * apart that resampling makes: use it with pfl_kernel_t, its mask on the first 2A states. u: not used. */
+typedef struct {
+    uint16_t axes;     /* 1 .. 3 */
+    uint16_t remember; /* 1: keep the positions before the step */
+} pfl_coast_t;
+
+void pfl_coast_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p);
+
+/* ---- Coordinated turn: a vehicle in the plane that holds speed and turn rate -------------------------------------- */
+/* States: x [m], y [m], speed [m/s], heading from x towards y [rad, not wrapped], turn rate [rad/s]; where `remember` is
+ * not 0 also the position before the step, for pfl_coloured_loglik. In this order:
+ *     v     += sigma_speed sqrt(dt) w0
+ *     omega += sigma_rate sqrt(dt) w1, or with probability redraw_hz dt, as a turn begins or ends: omega = redraw_sigma w1
+ *     x += dt v cos(psi + dt omega / 2),  y += dt v sin(psi + dt omega / 2),  psi += dt omega
+ * The noise comes first, so that copies of one particle part within the step: with few particles that is worth some
+ * percent. Q = 2; Q = 4 with redraw_hz > 0. u: not used. */
+enum {
+    PFL_TURN_X = 0,
+    PFL_TURN_Y = 1,
+    PFL_TURN_SPEED = 2,
+    PFL_TURN_HEADING = 3,
+    PFL_TURN_RATE = 4,
+    PFL_TURN_STATES = 5,
+    PFL_TURN_BEFORE_X = 5,
+    PFL_TURN_BEFORE_Y = 6,
+    PFL_TURN_REMEMBER_STATES = 7
+};
+
+typedef struct {
+    float sigma_speed;  /* random walk of the speed [m/s/sqrt(s)] */
+    float sigma_rate;   /* random walk of the turn rate [rad/s/sqrt(s)] */
+    float redraw_hz;    /* how often the turn rate is drawn anew, on average [1/s]; 0: never */
+    float redraw_sigma; /* standard deviation of the new one [rad/s] */
+    uint32_t remember;  /* 1: keep the position before the step */
+} pfl_turn_t;
+
+void pfl_turn_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p);
 
 #ifdef __cplusplus
 }

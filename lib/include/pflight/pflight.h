@@ -2,12 +2,15 @@
 #ifndef PFLIGHT_PFLIGHT_H
 #define PFLIGHT_PFLIGHT_H
 
+#include "pflight/constraints.h"
 #include "pflight/filter.h"
+#include "pflight/guidance.h"
 #include "pflight/math.h"
 #include "pflight/models.h"
 #include "pflight/port.h"
 #include "pflight/rng.h"
 #include "pflight/sensors.h"
 #include "pflight/status.h"
+#include "pflight/waypoints.h"
 
 #endif

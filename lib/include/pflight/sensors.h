@@ -22,6 +22,10 @@ typedef struct {
 /* z: float[count]. ll = -1/2 sum ((x - z) / sigma)^2. */
 void pfl_position_loglik(void *user, const void *z, const pfl_view_t *p, float *ll);
 
+/* The same, weighed by the inverse squared distance, 1 / (d^2 + sigma^2): ll = -log(1 + sum ((x - z) / sigma)^2). Flat,
+ * with heavy tails: it survives gross errors and learns slowly. */
+void pfl_position_distance_loglik(void *user, const void *z, const pfl_view_t *p, float *ll);
+
 /* ---- Range to a fixed point, with tails that survive gross errors ---------------------------------------------- */
 typedef struct {
     uint16_t x_state, y_state; /* position in the plane */
@@ -52,8 +56,41 @@ typedef struct {
     float bearing_rad; /* atan2(y - from_y, x - from_x); any multiple of 2 pi */
 } pfl_range_bearing_z_t;
 
-/* z: pfl_range_bearing_z_t. Gaussian in both, the bearing's innovation wrapped. */
+/* z: pfl_range_bearing_z_t. Gaussian in both, the bearing's innovation wrapped. A radar that measures azimuth from
+ * north over east has x_state = north and y_state = east. */
 void pfl_range_bearing_loglik(void *user, const void *z, const pfl_view_t *p, float *ll);
+
+/* ---- Position with an error that is correlated in time ------------------------------------------------------------ */
+/* A receiver whose error is e_k = decay e_{k-1} + w_k: each measurement less `decay` times the one before has a white
+ * error, w_k. Taking the errors for independent instead makes a filter far too sure of itself. The model keeps each
+ * particle's own position of the last measurement in states of its own (pfl_coast_t.remember, pfl_turn_t.remember), so
+ * exactly one predict must lie between two updates, one that dt_max_us does not cut. The first measurement has none
+ * before: pfl_position_loglik with the deviation of the error then. */
+typedef struct {
+    uint16_t count;                    /* axes, 1 .. PFL_POSITION_MAX */
+    uint16_t state[PFL_POSITION_MAX];  /* index of the position on axis k */
+    uint16_t before[PFL_POSITION_MAX]; /* and of the position at the measurement before */
+    float decay;                       /* of the error from one measurement to the next, 0 .. 1 */
+    float inv_sigma[PFL_POSITION_MAX]; /* 1 / standard deviation of w_k on axis k [1/m] */
+} pfl_coloured_t;
+
+typedef struct {
+    float now[PFL_POSITION_MAX];
+    float before[PFL_POSITION_MAX]; /* the measurement before */
+} pfl_coloured_z_t;
+
+/* z: pfl_coloured_z_t. ll = -1/2 sum (((z - x) - decay (z_before - x_before)) / sigma)^2. */
+void pfl_coloured_loglik(void *user, const void *z, const pfl_view_t *p, float *ll);
+
+/* ---- Velocity in the plane, for states that hold speed and heading ----------------------------------------------- */
+/* Where the states hold the velocity's components, pfl_position_loglik on those states is the sensor. */
+typedef struct {
+    uint16_t speed_state, heading_state; /* heading from x towards y */
+    float inv_sigma;                     /* 1 / standard deviation of each component [s/m] */
+} pfl_velocity_t;
+
+/* z: float[2], along x and y. ll = -1/2 |(v cos psi, v sin psi) - z|^2 / sigma^2. */
+void pfl_velocity_loglik(void *user, const void *z, const pfl_view_t *p, float *ll);
 
 #ifdef __cplusplus
 }

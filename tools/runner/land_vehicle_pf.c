@@ -1,0 +1,124 @@
+/* pflight itself on the land vehicle: configuration, prior, and the loop that a flight computer would run. */
+#include "host_random.h"
+#include "land_vehicle.h"
+
+#include <math.h>
+#include <stdlib.h>
+
+#define JITTER_SPEED_MPS 0.05f
+#define JITTER_HEADING_RAD 0.02f
+
+/* The vehicle stands first: the ready models take a pointer to the whole for a pointer to it. */
+typedef struct {
+    pfl_land_vehicle_t vehicle;
+    float start[PFL_LAND_STATES];
+    float start_sigma[PFL_LAND_STATES]; /* zeros: known start */
+} model_t;
+
+static void draw_start(void *user, const pfl_batch_t *p)
+{
+    const model_t *model = (const model_t *)user;
+
+    for (uint32_t d = 0u; d < PFL_LAND_STATES; d++) {
+        float *x = PFL_STATE(p, d);
+        const float *w = PFL_NOISE(p, d);
+        for (uint32_t i = 0u; i < p->n; i++) {
+            x[i] = model->start[d] + model->start_sigma[d] * w[i];
+            if (d == PFL_LAND_SPEED) {
+                x[i] = (float)land_clip_start_speed((double)x[i]);
+            }
+        }
+    }
+}
+
+static model_t make_model(const land_study_t *study)
+{
+    model_t model = {.vehicle = land_vehicle_constants};
+
+    model.vehicle.sigma_position_mps = (float)sqrt(study->w_variance);
+    model.vehicle.sigma_speed_mps = JITTER_SPEED_MPS;
+    model.vehicle.sigma_heading_rad = JITTER_HEADING_RAD;
+    for (int d = 0; d < PFL_LAND_STATES; d++) {
+        model.start[d] = (float)land_start[d];
+        model.start_sigma[d] = study->uncertain ? (float)land_start_sigma[d] : 0.0f;
+    }
+    return model;
+}
+
+static pfl_config_t make_config(const land_study_t *study, uint32_t run, model_t *model, const pfl_sensor_t *sensor)
+{
+    host_random_t random;
+
+    host_random_start(&random, study->seed, run, RANDOM_FILTER_SEED);
+    return (pfl_config_t){
+        .abi = PFL_ABI,
+        .particles = study->particles,
+        .states = PFL_LAND_STATES,
+        .noises = study->jitter ? 4u : 2u,
+        .sensor_count = 1u,
+        .resampling = (uint16_t)study->resampling,
+        .moments = PFL_MOMENTS_MEAN,
+        .ess_ratio = study->theta,
+        .seed = host_random_u64(&random),
+        .sensors = sensor,
+        .predict = study->jitter ? pfl_land_vehicle_jitter_predict : pfl_land_vehicle_predict,
+        .draw = draw_start,
+        .user = model,
+    };
+}
+
+/* A status below zero is an error; gate and budget are off, so there are no refusals. */
+static bool check(pfl_status_t status, const char *call, unsigned k, failure_t *failure)
+{
+    return status >= 0 || fail(failure, EXIT_HARNESS, "step %u: %s: %s", k, call, pfl_status_string(status));
+}
+
+static bool fly(pfl_t *filter, const land_track_t *track, land_estimate_t *estimate, failure_t *failure)
+{
+    const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
+    pfl_health_t health;
+
+    for (unsigned k = 1u; k <= LAND_STEPS; k++) {
+        const uint64_t t_us = (uint64_t)k * LAND_PERIOD_US;
+        const pfl_land_input_t input = land_input(k - 1u);
+        float mean[PFL_LAND_STATES];
+
+        if (!check(pfl_predict(filter, t_us, &input), "pfl_predict", k, failure) ||
+            !check(pfl_update(filter, 0u, t_us, track->z[k]), "pfl_update", k, failure) ||
+            !check(pfl_estimate(filter, mean, NULL), "pfl_estimate", k, failure) ||
+            !check(pfl_health(filter, &health), "pfl_health", k, failure)) {
+            return false;
+        }
+        for (int d = 0; d < PFL_LAND_STATES; d++) {
+            estimate->x[k][d] = (double)mean[d];
+        }
+        estimate->cycles_ns[k - 1u] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
+        estimate->resampled = health.resampled;
+    }
+    return true;
+}
+
+bool land_particle_filter(const land_study_t *study, uint32_t run, const land_track_t *track, land_estimate_t *estimate,
+                          failure_t *failure)
+{
+    const float inv_sigma = (float)(1.0 / sqrt(study->z_variance));
+    pfl_position_t position = {
+        LAND_MEASURED,
+        {PFL_LAND_EAST, PFL_LAND_NORTH, PFL_LAND_SPEED, 0u},
+        {inv_sigma, inv_sigma, inv_sigma, 0.0f},
+    };
+    const pfl_sensor_t sensor = {.loglik = pfl_position_loglik, .user = &position};
+    model_t model = make_model(study);
+    const pfl_config_t config = make_config(study, run, &model, &sensor);
+    const size_t bytes = PFL_ARENA_BYTES(config.particles, config.states, config.noises);
+    void *arena = malloc(bytes);
+    pfl_t *filter;
+
+    if (arena == NULL) {
+        return fail(failure, EXIT_HARNESS, "no memory for %lu particles", (unsigned long)study->particles);
+    }
+    const bool flown = check(pfl_init(arena, bytes, &config, 0u, &filter), "pfl_init", 0u, failure) &&
+                       fly(filter, track, estimate, failure);
+    free(arena);
+    return flown;
+}

@@ -1,0 +1,54 @@
+/* The list of scenarios, and the small things that every one of them needs. A new scenario is named here. */
+#include "scenario.h"
+
+#include "land_vehicle.h"
+#include "standoff.h"
+#include "uav_trajectory.h"
+#include "uwb_range.h"
+
+#include <stdlib.h>
+#include <string.h>
+
+const scenario_t *const all_scenarios[] = {&land_vehicle_scenario, &uwb_range_scenario, &standoff_scenario,
+                                           &uav_trajectory_scenario};
+const size_t all_scenarios_count = sizeof all_scenarios / sizeof all_scenarios[0];
+
+const scenario_t *scenario_find(const char *name)
+{
+    for (size_t i = 0u; i < all_scenarios_count; i++) {
+        if (strcmp(all_scenarios[i]->name, name) == 0) {
+            return all_scenarios[i];
+        }
+    }
+    return NULL;
+}
+
+const char *study_value(const study_t *study, const char *key)
+{
+    for (size_t i = 0u; i < study->scenario->settings_count; i++) {
+        if (strcmp(study->scenario->settings[i].key, key) == 0) {
+            return study->value[i];
+        }
+    }
+    abort(); /* a scenario asked for a setting that it does not have */
+}
+
+bool study_is(const study_t *study, const char *key, const char *value)
+{
+    return strcmp(study_value(study, key), value) == 0;
+}
+
+double study_number(const study_t *study, const char *key)
+{
+    return strtod(study_value(study, key), NULL);
+}
+
+metric_t *verdict_add(verdict_t *verdict, const char *name, figure_t ours)
+{
+    if (verdict->count == METRICS_MAX) {
+        abort(); /* a scenario has more metrics than METRICS_MAX */
+    }
+    metric_t *metric = &verdict->metric[verdict->count++];
+    *metric = (metric_t){name, ours, MISSING, MISSING, MISSING, MISSING};
+    return metric;
+}
