@@ -14,6 +14,13 @@
 
 #include "bits.h"
 
+/* Keeps a function's frame off the stack of its siblings: inlined, the largest of them would count for all. */
+#if defined(__GNUC__)
+#define PFL_NOINLINE __attribute__((noinline))
+#else
+#define PFL_NOINLINE
+#endif
+
 #define PFL_ALIVE 0x70666C79u /* "pfly": the arena holds a filter */
 #define PFL_GROUP 16u         /* particles in the first batch of a predict, which decides whether to go on */
 

@@ -91,7 +91,7 @@ pfl_status_t pfl_predict(pfl_t *f, uint64_t t_us, const void *u)
 /* ---- Update --------------------------------------------------------------------------------------------------- */
 
 /* All log-likelihoods into the scratch column; PFL_ERR_BUDGET when the budget ends first. */
-static pfl_status_t weigh(pfl_t *f, const pfl_sensor_t *sensor, const void *z, pfl_weigh_t *w)
+PFL_NOINLINE static pfl_status_t weigh(pfl_t *f, const pfl_sensor_t *sensor, const void *z, pfl_weigh_t *w)
 {
     const uint32_t count = f->config->particles;
     void *user = (sensor->user != NULL) ? sensor->user : f->config->user;
@@ -112,7 +112,7 @@ static pfl_status_t weigh(pfl_t *f, const pfl_sensor_t *sensor, const void *z, p
 }
 
 /* Judges what the sensor said of the particles. */
-static pfl_status_t judge(pfl_t *f, const pfl_sensor_t *sensor, const pfl_weigh_t *w)
+PFL_NOINLINE static pfl_status_t judge(pfl_t *f, const pfl_sensor_t *sensor, const pfl_weigh_t *w)
 {
     const int32_t minus_infinity = (int32_t)0xFF800000u;
     if (w->worst_bits > minus_infinity) {

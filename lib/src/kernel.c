@@ -18,7 +18,7 @@ static bool takes_part(const pfl_t *f, uint32_t d)
 
 /* Cholesky root of the covariance in place: C = U' U, U upper triangular. A state without spread of its own gets a row
  * of zeros, so that a semi-definite matrix is no error. */
-static void root_in_place(const pfl_t *f, float *u)
+PFL_NOINLINE static void root_in_place(const pfl_t *f, float *u)
 {
     const uint32_t states = f->config->states;
     for (uint32_t d = 0u; d < states; d++) {
@@ -41,7 +41,7 @@ static void root_in_place(const pfl_t *f, float *u)
     }
 }
 
-static void move_state(pfl_t *f, uint32_t d, uint32_t first, uint32_t n)
+PFL_NOINLINE static void move_state(pfl_t *f, uint32_t d, uint32_t first, uint32_t n)
 {
     const uint32_t states = f->config->states;
     const float width = f->config->kernel->width;

@@ -70,7 +70,7 @@ static void product_lanes(float *row, const float *a, const float *b, uint32_t n
     memcpy(row, sum, sizeof sum);
 }
 
-static void weigh_lanes(pfl_t *f, uint32_t first, uint32_t n)
+PFL_NOINLINE static void weigh_lanes(pfl_t *f, uint32_t first, uint32_t n)
 {
     const float *restrict s = &f->log_weight[first];
     float *restrict w = &f->scratch[first];
@@ -119,7 +119,7 @@ static void deviations(pfl_t *f, uint32_t d, const float *restrict x, uint32_t n
 }
 
 /* Sums of sine and cosine of the angles, about the most likely particle. */
-static void circle_lanes(pfl_t *f, uint32_t first, uint32_t n)
+PFL_NOINLINE static void circle_lanes(pfl_t *f, uint32_t first, uint32_t n)
 {
     const uint32_t states = f->config->states;
     float *restrict work = f->work;
@@ -151,7 +151,7 @@ static void centre_circles(const pfl_t *f)
     }
 }
 
-static void state_lanes(pfl_t *f, uint32_t first, uint32_t n)
+PFL_NOINLINE static void state_lanes(pfl_t *f, uint32_t first, uint32_t n)
 {
     const uint32_t states = f->config->states;
     const uint32_t padded = (uint32_t)PFL_CEIL8(n);
@@ -186,7 +186,7 @@ static void state_lanes(pfl_t *f, uint32_t first, uint32_t n)
 }
 
 /* Sums to mean and covariance. The shift of the mean from the centre is taken off the second moments again. */
-static void finish(const pfl_t *f, float *mean, float *cov)
+PFL_NOINLINE static void finish(const pfl_t *f, float *mean, float *cov)
 {
     const uint32_t states = f->config->states;
     const float sum = lane_sum(lane_row(f, LANE_WEIGHT));
@@ -254,7 +254,7 @@ void pfl_weights(pfl_t *f)
 }
 
 /* Weights of all particles and, where there are angles, their circular means; false when the budget ran out. */
-static bool weigh_up(pfl_t *f, bool budgeted)
+PFL_NOINLINE static bool weigh_up(pfl_t *f, bool budgeted)
 {
     const uint32_t count = f->config->particles;
     for (uint32_t first = 0u; first < count; first += PFL_BATCH) {

@@ -7,6 +7,14 @@
 #include "rng_kernels.h"
 #include "sqrt_kernel.h"
 
+/* A copy that nothing else can point to lets a compiler keep the streams in vector registers; where there are none, it
+ * would only cost stack. */
+#if defined(__SSE2__) || defined(__ARM_NEON) || defined(__ALTIVEC__) || defined(__riscv_vector)
+#define WORK_ON_COPY 1
+#else
+#define WORK_ON_COPY 0
+#endif
+
 /* sqrt(-2 log u) with u = (bits/2 + 1/2) / 2^31 in (0, 1], uniform. */
 static inline float radius(uint32_t bits)
 {
@@ -47,8 +55,12 @@ static inline float half_circle_sin(float v, float v2)
 
 void pfl_rng_normals(pfl_rng_t *rng, float *out, size_t groups)
 {
+#if WORK_ON_COPY
     uint32_t s[4][PFL_RNG_LANES];
     memcpy(s, rng->s, sizeof s);
+#else
+    uint32_t(*s)[PFL_RNG_LANES] = rng->s;
+#endif
     for (size_t g = 0; g < groups; g++) {
         float *z = &out[g * 2u * PFL_RNG_LANES];
         for (uint32_t l = 0u; l < PFL_RNG_LANES; l++) {
@@ -68,5 +80,7 @@ void pfl_rng_normals(pfl_rng_t *rng, float *out, size_t groups)
             z[l + PFL_RNG_LANES] = r * half_circle_sin(v, v2);
         }
     }
+#if WORK_ON_COPY
     memcpy(rng->s, s, sizeof s);
+#endif
 }

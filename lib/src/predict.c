@@ -23,7 +23,7 @@ uint32_t pfl_count_nonfinite(const pfl_t *f, uint32_t first, uint32_t n)
 }
 
 /* One addition a value: a NaN or an infinity anywhere in the batch stays in the sum. */
-static bool batch_is_suspect(const pfl_t *f, uint32_t first, uint32_t n)
+PFL_NOINLINE static bool batch_is_suspect(const pfl_t *f, uint32_t first, uint32_t n)
 {
     float sum[8] = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
     for (uint32_t d = 0u; d < f->config->states; d++) {
@@ -39,7 +39,7 @@ static bool batch_is_suspect(const pfl_t *f, uint32_t first, uint32_t n)
 }
 
 /* Non-finite particles take the state of the most likely one, which is finite, and lose their weight. */
-static uint32_t quarantine(pfl_t *f, uint32_t first, uint32_t n)
+PFL_NOINLINE static uint32_t quarantine(pfl_t *f, uint32_t first, uint32_t n)
 {
     uint32_t found = 0u;
     for (uint32_t i = first; i < (first + n); i++) {
@@ -120,7 +120,7 @@ static bool first_group_survives(pfl_t *f, const void *u, float dt_s, uint32_t n
 }
 
 /* One model step for all particles; *lost grows by those quarantined. */
-static pfl_status_t step(pfl_t *f, const void *u, float dt_s, bool undoable, uint32_t *lost)
+PFL_NOINLINE static pfl_status_t step(pfl_t *f, const void *u, float dt_s, bool undoable, uint32_t *lost)
 {
     const uint32_t count = f->config->particles;
     uint32_t n = (count < PFL_GROUP) ? count : PFL_GROUP;
@@ -150,7 +150,7 @@ static pfl_status_t step(pfl_t *f, const void *u, float dt_s, bool undoable, uin
 /* What the budget put off in the cycle before is done first, so that a filter that was cut short goes on with the same
  * bits as one that was not; but not before a rehearsal has shown that the model works, after which nothing could be
  * undone. */
-static pfl_status_t catch_up(pfl_t *f, const void *u, float dt_s)
+PFL_NOINLINE static pfl_status_t catch_up(pfl_t *f, const void *u, float dt_s)
 {
     const uint32_t count = f->config->particles;
     if (!first_group_survives(f, u, dt_s, (count < PFL_GROUP) ? count : PFL_GROUP, true)) {

@@ -87,7 +87,7 @@ static void copy_listed(pfl_t *f, const lists_t *lists)
     }
 }
 
-static void resample_systematic(pfl_t *f)
+PFL_NOINLINE static void resample_systematic(pfl_t *f)
 {
     const uint32_t count = f->config->particles;
     const comb_t comb = comb_of(count, quantise(f));
@@ -105,7 +105,7 @@ static void resample_systematic(pfl_t *f)
     copy_listed(f, &lists);
 }
 
-static void resample_stratified(pfl_t *f)
+PFL_NOINLINE static void resample_stratified(pfl_t *f)
 {
     const uint32_t count = f->config->particles;
     const comb_t comb = comb_of(count, quantise(f));
@@ -181,7 +181,7 @@ static void draw_independently(pfl_t *f, uint32_t total, uint32_t draws)
     }
 }
 
-static void resample_multinomial(pfl_t *f)
+PFL_NOINLINE static void resample_multinomial(pfl_t *f)
 {
     const uint32_t count = f->config->particles;
     uint32_t sum = 0u;
@@ -195,7 +195,7 @@ static void resample_multinomial(pfl_t *f)
     copy_counted(f);
 }
 
-static void resample_residual(pfl_t *f)
+PFL_NOINLINE static void resample_residual(pfl_t *f)
 {
     const uint32_t count = f->config->particles;
     const comb_t comb = comb_of(count, quantise(f)); /* shares sum to less than N + 1: copies never exceed N */

@@ -26,15 +26,14 @@ pfl_status_t pfl_reset(pfl_t *f, uint64_t t_us)
         return PFL_ERR_NO_DRAW;
     }
     const uint32_t states = f->config->states;
-    float before[PFL_STATES_MAX];
     pfl_refresh(f);
-    memcpy(before, f->mean, sizeof(float) * states);
+    memcpy(f->delta, f->mean, sizeof(float) * states); /* the mean before, until the jump is known */
     const pfl_status_t drawn = pfl_draw_prior(f);
     if (drawn != PFL_OK) {
-        gather_at_mean(f, before);
+        gather_at_mean(f, f->delta);
     }
     for (uint32_t d = 0u; d < states; d++) {
-        const float jump = f->mean[d] - before[d];
+        const float jump = f->mean[d] - f->delta[d];
         f->delta[d] = (((f->config->circular_mask >> d) & 1u) != 0u) ? pfl_wrap_pi_kernel(jump) : jump;
     }
     f->t_us = t_us;
