@@ -1,9 +1,10 @@
 /* From a study to its results on paper: see execute.h. Everything is computed before anything is written. */
 #include "execute.h"
 
+#include "cloud.h"
 #include "hash.h"
+#include "json.h"
 #include "monte_carlo.h"
-#include "render.h"
 
 #include <errno.h>
 #include <math.h>
@@ -11,24 +12,45 @@
 #include <stdlib.h>
 #include <string.h>
 #include <sys/stat.h>
+#include <time.h>
 
 /* ---- Results ------------------------------------------------------------------------------------------------------ */
 
-static timing_t time_cycles(const study_t *study, const plan_t *plan, uint32_t *cycles_ns)
+/* Sorts them. */
+static spread_t spread_of(uint32_t *ns, size_t n)
+{
+    if (n == 0u) {
+        return (spread_t){MISSING, MISSING, MISSING};
+    }
+    stats_sort_u32(ns, n);
+    return (spread_t){
+        .p50_us = 1e-3 * (double)stats_quantile_u32(ns, n, 0.50),
+        .p99_us = 1e-3 * (double)stats_quantile_u32(ns, n, 0.99),
+        .max_us = 1e-3 * (double)ns[n - 1u],
+    };
+}
+
+static timing_t time_cycles(const study_t *study, const plan_t *plan, const results_t *results)
 {
     const size_t n = study->runs * plan->cycles;
-    timing_t timing = {.budget_us = study->budget_us > 0.0 ? study->budget_us : plan->budget_us};
+    uint32_t *ns = results->cycles_ns;
+    timing_t timing = {
+        .cycle = spread_of(ns, n),
+        .budget_us = study->budget_us > 0.0 ? study->budget_us : plan->budget_us,
+    };
+    size_t resampled = 0u;
 
-    if (n == 0u) {
-        return timing;
-    }
-    stats_sort_u32(cycles_ns, n);
-    timing.p50_us = 1e-3 * (double)stats_quantile_u32(cycles_ns, n, 0.50);
-    timing.p99_us = 1e-3 * (double)stats_quantile_u32(cycles_ns, n, 0.99);
-    timing.max_us = 1e-3 * (double)cycles_ns[n - 1u];
-    for (size_t i = n; i > 0u && 1e-3 * (double)cycles_ns[i - 1u] > timing.budget_us; i--) {
+    for (size_t i = n; i > 0u && 1e-3 * (double)ns[i - 1u] > timing.budget_us; i--) {
         timing.overruns++;
     }
+    /* The cycle times have been counted: their room takes the times of resampling. */
+    for (size_t i = 0u; i < n; i++) {
+        if (results->cycle[i].resample_ns > 0u) {
+            ns[resampled++] = results->cycle[i].resample_ns;
+        }
+    }
+    timing.resampling = spread_of(ns, resampled);
+    timing.resampled_share = n == 0u ? 0.0 : (double)resampled / (double)n;
     return timing;
 }
 
@@ -40,7 +62,7 @@ static bool assess(outcome_t *outcome, failure_t *failure)
     const table_t runs = {outcome->results->value, study->runs, plan->values};
 
     study->scenario->judge(plan, runs, &outcome->verdict);
-    outcome->timing = time_cycles(study, plan, outcome->results->cycles_ns);
+    outcome->timing = time_cycles(study, plan, outcome->results);
     outcome->hash = HASH_START;
     for (uint32_t r = 0u; r < study->runs; r++) {
         outcome->hash = hash_u64(outcome->hash, outcome->results->hash[r]);
@@ -54,21 +76,9 @@ static bool assess(outcome_t *outcome, failure_t *failure)
     return true;
 }
 
-static bool all_accepted(const verdict_t *verdict)
-{
-    for (size_t i = 0u; i < verdict->count; i++) {
-        if (metric_is_judged(&verdict->metric[i]) && !metric_is_accepted(&verdict->metric[i])) {
-            return false;
-        }
-    }
-    return true;
-}
-
 /* ---- Output ------------------------------------------------------------------------------------------------------- */
 
-typedef void (*render_fn)(const outcome_t *outcome, text_t *text);
-
-static bool write_rendered(render_fn render, const outcome_t *outcome, const char *path, failure_t *failure)
+bool execute_write(render_fn render, const outcome_t *outcome, const char *path, failure_t *failure)
 {
     text_t text = {0};
 
@@ -90,7 +100,7 @@ static bool write_csv(const outcome_t *outcome, const char *folder, failure_t *f
     bool written = mkdir(folder, 0777) == 0 || errno == EEXIST ||
                    fail(failure, EXIT_HARNESS, "--csv '%s': cannot make this folder: %s", folder, strerror(errno));
     (void)snprintf(path, room, "%s/%s.csv", folder, name);
-    written = written && write_rendered(render_csv, outcome, path, failure);
+    written = written && execute_write(render_csv, outcome, path, failure);
     free(path);
     return written;
 }
@@ -100,14 +110,23 @@ static bool write_outputs(const cli_t *cli, const outcome_t *outcome, failure_t 
     const bool json_only = cli->json != NULL && strcmp(cli->json, "-") == 0;
 
     return (cli->csv == NULL || write_csv(outcome, cli->csv, failure)) &&
-           (cli->json == NULL || write_rendered(render_json, outcome, cli->json, failure)) &&
-           (json_only || write_rendered(render_table, outcome, "-", failure));
+           (cli->json == NULL || execute_write(json_study, outcome, cli->json, failure)) &&
+           (json_only || execute_write(render_table, outcome, "-", failure));
 }
 
 /* ---- Studies ------------------------------------------------------------------------------------------------------ */
 
-static bool run_study(const cli_t *cli, const study_t *study, bool *accepted, failure_t *failure)
+static double now_s(void)
 {
+    struct timespec now = {0, 0};
+
+    (void)clock_gettime(CLOCK_MONOTONIC, &now);
+    return (double)now.tv_sec + 1e-9 * (double)now.tv_nsec;
+}
+
+bool execute_study(const cli_t *cli, const study_t *study, use_fn use, void *user, failure_t *failure)
+{
+    const double begin_s = now_s();
     plan_t plan;
     results_t results = {0};
     outcome_t outcome = {.study = study, .plan = &plan, .results = &results};
@@ -115,62 +134,83 @@ static bool run_study(const cli_t *cli, const study_t *study, bool *accepted, fa
     if (!study->scenario->open(study, &plan, failure)) {
         return false;
     }
-    const bool done = monte_carlo(study, &plan, cli->threads, &results, failure) && assess(&outcome, failure) &&
-                      write_outputs(cli, &outcome, failure);
-    *accepted = *accepted && all_accepted(&outcome.verdict);
+    bool done = monte_carlo(study, &plan, cli->threads, &results, failure) && assess(&outcome, failure);
+    outcome.elapsed_s = now_s() - begin_s;
+    done = done && use(user, &outcome, failure);
     text_free(&outcome.verdict.notes);
     results_free(&results);
     study->scenario->close(&plan);
     return done;
 }
 
+bool execute_trace(const study_t *study, uint32_t run, const char *trace, const char *cloud, traced_t *traced,
+                   failure_t *failure)
+{
+    plan_t plan;
+    results_t results = {0};
+    text_t text = {0};
+
+    if (!study->scenario->open(study, &plan, failure)) {
+        return false;
+    }
+    bool done = monte_carlo_trace(study, &plan, run, &results, failure);
+    if (done) {
+        render_trace(&plan, &results, &text);
+        *traced = (traced_t){plan.steps, results.cloud.length > 0u, hash_u64(HASH_START, results.hash[0])};
+        done = text_write(&text, trace, failure);
+    }
+    text_free(&text);
+    if (done && cloud != NULL && traced->cloud) {
+        text_add(&text, "%s%s", CLOUD_HEADER, results.cloud.bytes);
+        text.spoilt = text.spoilt || results.cloud.spoilt;
+        done = text_write(&text, cloud, failure);
+    }
+    text_free(&text);
+    results_free(&results);
+    study->scenario->close(&plan);
+    return done;
+}
+
+static bool trace_one(const cli_t *cli, const study_t *study, failure_t *failure)
+{
+    traced_t traced;
+
+    if (!execute_trace(study, cli->trace_run, cli->trace, cli->cloud, &traced, failure)) {
+        return false;
+    }
+    if (cli->cloud != NULL && !traced.cloud) {
+        return fail(failure, EXIT_HARNESS, "--cloud: %s has no particles to show with these settings",
+                    study->scenario->name);
+    }
+    if (strcmp(cli->trace, "-") != 0) {
+        (void)printf("%s: run %lu of seed %llu: %lu steps in %s; hash %016llx\n", study->scenario->name,
+                     (unsigned long)cli->trace_run, (unsigned long long)study->seed, (unsigned long)traced.steps,
+                     cli->trace, (unsigned long long)traced.hash);
+    }
+    return true;
+}
+
+typedef struct {
+    const cli_t *cli;
+    bool *accepted;
+} one_t;
+
+static bool use_one(void *user, const outcome_t *outcome, failure_t *failure)
+{
+    const one_t *one = user;
+
+    *one->accepted = outcome_is_accepted(outcome);
+    return write_outputs(one->cli, outcome, failure);
+}
+
 bool execute_one(const cli_t *cli, bool *accepted, failure_t *failure)
 {
+    one_t one = {cli, accepted};
     study_t study;
 
     *accepted = true;
-    return cli_study(cli, cli->scenario, &study, failure) && run_study(cli, &study, accepted, failure);
-}
-
-/* A study of a campaign is a command line like any other. */
-static bool run_campaign_entry(const cli_t *cli, const scenario_t *scenario, const campaign_t *entry, bool *accepted,
-                               failure_t *failure)
-{
-    cli_t line = *cli;
-    study_t study;
-
-    line.filter = entry->filter;
-    line.runs = cli->runs != 0u ? cli->runs : entry->runs;
-    while (line.sets < STUDY_SETS_MAX && entry->set[line.sets] != NULL) {
-        line.set[line.sets] = entry->set[line.sets];
-        line.sets++;
+    if (!cli_study(cli, cli->scenario, &study, failure)) {
+        return false;
     }
-    return cli_study(&line, scenario, &study, failure) && run_study(&line, &study, accepted, failure);
-}
-
-static bool run_campaign(const cli_t *cli, const scenario_t *scenario, bool *accepted, failure_t *failure)
-{
-    for (size_t i = 0u; i < scenario->campaign_count; i++) {
-        if (run_campaign_entry(cli, scenario, &scenario->campaign[i], accepted, failure)) {
-            continue;
-        }
-        if (!failure->recording_missing) {
-            return false;
-        }
-        (void)printf("%s: skipped: %s; its recordings are published here: %s\n\n", scenario->name, failure->text,
-                     scenario->recordings);
-        return true;
-    }
-    return true;
-}
-
-bool execute_all(const cli_t *cli, bool *accepted, failure_t *failure)
-{
-    *accepted = true;
-    for (size_t i = 0u; i < all_scenarios_count; i++) {
-        if (!run_campaign(cli, all_scenarios[i], accepted, failure)) {
-            return false;
-        }
-    }
-    return true;
+    return cli->trace != NULL ? trace_one(cli, &study, failure) : execute_study(cli, &study, use_one, &one, failure);
 }

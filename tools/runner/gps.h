@@ -106,7 +106,7 @@ bool gps_axis_update(gps_axis_t *axis, double position, double velocity);
 /* Kalman's gain that the next update would have, states x measured. */
 bool gps_axis_gain(const gps_axis_t *axis, double *gain);
 
-/* NEES of position and velocity. */
+/* NEES of position and velocity; MISSING for a covariance without volume, as of particles that all sit at one point. */
 double gps_nees(const double *error, double p_pp, double p_pv, double p_vv);
 
 /* acceleration: what the filter believes in, as q_tuned. */

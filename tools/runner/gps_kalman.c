@@ -7,6 +7,7 @@
 #include <string.h>
 
 #define RADAR_VELOCITY_VARIANCE 4.0
+#define NO_VOLUME 1e-6 /* share of the product of variances: the rounding of a covariance in single precision */
 
 static void set_motion(gps_axis_t *axis, double decay, double e_variance, double acceleration)
 {
@@ -116,6 +117,9 @@ double gps_nees(const double *error, double p_pp, double p_pv, double p_vv)
 {
     const double determinant = p_pp * p_vv - p_pv * p_pv;
 
+    if (!(determinant > NO_VOLUME * p_pp * p_vv)) {
+        return MISSING;
+    }
     return (p_vv * error[0] * error[0] - 2.0 * p_pv * error[0] * error[1] + p_pp * error[1] * error[1]) / determinant;
 }
 

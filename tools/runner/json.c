@@ -132,11 +132,28 @@ static void add_notes(text_t *text, const char *notes)
     json_string(text, notes != NULL ? notes : "");
 }
 
+/* The settings that are not as by default. */
+static void add_special(text_t *text, const study_t *study)
+{
+    bool first = true;
+
+    text_add(text, ",\"special\":[");
+    for (size_t i = 0u; i < study->scenario->settings_count; i++) {
+        if (strcmp(study->value[i], study->scenario->settings[i].fallback) != 0) {
+            text_add(text, first ? "" : ",");
+            json_string(text, study->scenario->settings[i].key);
+            first = false;
+        }
+    }
+    text_add(text, "]");
+}
+
 void json_summary_study(const outcome_t *outcome, const char *id, bool cloud, text_t *text)
 {
     add_study(text, outcome, true);
     text_add(text, ",\"accepted\":%s,\"id\":", outcome_is_accepted(outcome) ? "true" : "false");
     json_string(text, id);
+    add_special(text, outcome->study);
     text_add(text, ",\"summary\":");
     json_string(text, outcome->study->scenario->summary);
     text_add(text, ",\"budget_reason\":");

@@ -21,6 +21,13 @@ static const setting_t settings[] = {
 static const char *const columns[] = {"eps_k", "eps_1_k", "eps_2_k", "eps_3_k", "eps_4_k"};
 enum { COLUMNS = sizeof columns / sizeof columns[0] };
 
+static const char *const trace_columns[] = {
+    "truth_east_m",    "truth_north_m",    "truth_speed_mps",    "truth_heading_rad",
+    "estimate_east_m", "estimate_north_m", "estimate_speed_mps", "estimate_heading_rad",
+    "measured_east_m", "measured_north_m", "measured_speed_mps",
+};
+enum { TRACE_COLUMNS = sizeof trace_columns / sizeof trace_columns[0] };
+
 /* Position of a value among the choices of a setting, which stand in the order of the enumeration they stand for. */
 static unsigned choice_index(const study_t *study, const char *key)
 {
@@ -75,6 +82,8 @@ static bool open_study(const study_t *study, plan_t *plan, failure_t *failure)
         .steps = LAND_STEPS,
         .columns = COLUMNS,
         .column = columns,
+        .trace_columns = TRACE_COLUMNS,
+        .trace_column = trace_columns,
         .period_s = LAND_PERIOD_S,
         .budget_us = 5000.0,
         .budget_reason = "2 updates a second, 1 % of the time between them",
@@ -108,6 +117,21 @@ static double score(const land_track_t *track, const land_estimate_t *estimate, 
         }
     }
     return sum / (double)LAND_STEPS;
+}
+
+/* trace: null unless the run is traced. */
+static void fill_trace(const land_track_t *track, const land_estimate_t *estimate, double *trace)
+{
+    for (unsigned k = 1u; k <= LAND_STEPS && trace != NULL; k++) {
+        double *row = &trace[(k - 1u) * TRACE_COLUMNS];
+        for (unsigned d = 0u; d < PFL_LAND_STATES; d++) {
+            row[d] = track->truth[k][d];
+            row[PFL_LAND_STATES + d] = estimate->x[k][d];
+        }
+        for (unsigned m = 0u; m < LAND_MEASURED; m++) {
+            row[2u * PFL_LAND_STATES + m] = (double)track->z[k][m];
+        }
+    }
 }
 
 static bool filter_track(const land_study_t *s, uint32_t run, const land_track_t *track, land_estimate_t *estimate,
@@ -154,8 +178,10 @@ static bool run_once(const plan_t *plan, uint32_t run, run_output_t *out, failur
         return false;
     }
     out->value[LAND_ETA] = score(&track, &estimate, out->series);
-    out->value[LAND_RESAMPLED] = (double)estimate.resampled / (double)LAND_STEPS;
+    out->value[LAND_RESAMPLED] = (double)estimate.cycle[LAND_STEPS - 1].resampled / (double)LAND_STEPS;
     memcpy(out->cycles_ns, estimate.cycles_ns, sizeof estimate.cycles_ns);
+    memcpy(out->cycle, estimate.cycle, sizeof estimate.cycle);
+    fill_trace(&track, &estimate, out->trace);
     for (unsigned k = 1u; k <= LAND_STEPS; k++) {
         for (int d = 0; d < PFL_LAND_STATES; d++) {
             const float x = (float)estimate.x[k][d];
@@ -166,13 +192,15 @@ static bool run_once(const plan_t *plan, uint32_t run, run_output_t *out, failur
 }
 
 static const campaign_t campaign[] = {
-    {"pf", 1000u, {"case=1"}},
-    {"pf", 1000u, {"case=2"}},
-    {"pf", 1000u, {"case=3"}},
-    {"ukf", 1000u, {"case=1"}},
-    {"ukf", 1000u, {"case=1", "ukf=q-zero-p-zero"}},
-    {"pf", 1000u, {"case=1", "start=uncertain"}},
-    {"pf", 1000u, {"case=1", "start=uncertain", "jitter=on"}},
+    {"pf", 1000u, {"case=1"}, 0u},
+    {"pf", 1000u, {"case=2"}, 0u},
+    {"pf", 1000u, {"case=3"}, 0u},
+    {"ukf", 1000u, {"case=1"}, 0u},
+    {"ukf", 1000u, {"case=2"}, 0u},
+    {"ukf", 1000u, {"case=3"}, 0u},
+    {"ukf", 1000u, {"case=1", "ukf=q-zero-p-zero"}, 0u},
+    {"pf", 1000u, {"case=1", "start=uncertain"}, 0u},
+    {"pf", 1000u, {"case=1", "start=uncertain", "jitter=on"}, 0u},
 };
 
 const scenario_t land_vehicle_scenario = {

@@ -56,7 +56,7 @@ typedef struct {
 typedef struct {
     double x[LAND_STEPS + 1][PFL_LAND_STATES];
     uint32_t cycles_ns[LAND_STEPS];
-    uint32_t resampled;
+    cycle_t cycle[LAND_STEPS]; /* zeros of a Kalman filter */
 } land_estimate_t;
 
 extern const scenario_t land_vehicle_scenario;

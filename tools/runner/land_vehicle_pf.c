@@ -1,4 +1,5 @@
 /* pflight itself on the land vehicle: configuration, prior, and the loop that a flight computer would run. */
+#include "cloud.h"
 #include "host_random.h"
 #include "land_vehicle.h"
 
@@ -93,7 +94,7 @@ static bool fly(pfl_t *filter, const land_track_t *track, land_estimate_t *estim
             estimate->x[k][d] = (double)mean[d];
         }
         estimate->cycles_ns[k - 1u] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
-        estimate->resampled = health.resampled;
+        estimate->cycle[k - 1u] = cycle_of(&health);
     }
     return true;
 }

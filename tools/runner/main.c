@@ -1,4 +1,5 @@
 /* pflight_run, behind tools/run: runs the scenarios and says how the figures stand to those of the papers. */
+#include "campaign.h"
 #include "cli.h"
 #include "execute.h"
 
@@ -16,7 +17,7 @@ static bool print(void (*write)(text_t *), failure_t *failure)
 
 static bool run_all(const cli_t *cli, bool *accepted, failure_t *failure)
 {
-    const bool done = execute_all(cli, accepted, failure);
+    const bool done = campaign_run(cli, accepted, failure);
 
     if (done) {
         (void)printf("%s\n", *accepted ? "all within the stated acceptance" : "NOT all within the stated acceptance");

@@ -1,16 +1,19 @@
 /* The list of scenarios, and the small things that every one of them needs. A new scenario is named here. */
 #include "scenario.h"
 
+#include "gps.h"
 #include "land_vehicle.h"
 #include "standoff.h"
 #include "uav_trajectory.h"
 #include "uwb_range.h"
 
+#include <ctype.h>
+#include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
 const scenario_t *const all_scenarios[] = {&land_vehicle_scenario, &uwb_range_scenario, &standoff_scenario,
-                                           &uav_trajectory_scenario};
+                                           &uav_trajectory_scenario, &gps_scenario};
 const size_t all_scenarios_count = sizeof all_scenarios / sizeof all_scenarios[0];
 
 const scenario_t *scenario_find(const char *name)
@@ -41,6 +44,42 @@ bool study_is(const study_t *study, const char *key, const char *value)
 double study_number(const study_t *study, const char *key)
 {
     return strtod(study_value(study, key), NULL);
+}
+
+/* Appends "-WORD", with underscores for what does not belong into the name of a file. */
+static void append_word(char *id, const char *word)
+{
+    size_t length = strlen(id);
+
+    if (length > 0u && length + 1u < STUDY_ID_MAX) {
+        id[length++] = '-';
+    }
+    for (; *word != '\0' && length + 1u < STUDY_ID_MAX; word++) {
+        const bool fit = isalnum((unsigned char)*word) != 0 || strchr("+-._", *word) != NULL;
+        id[length++] = fit ? *word : '_';
+    }
+    id[length] = '\0';
+}
+
+void study_id(const study_t *study, char *id)
+{
+    const scenario_t *scenario = study->scenario;
+    char number[16];
+
+    id[0] = '\0';
+    append_word(id, scenario->name);
+    append_word(id, study->filter);
+    for (size_t i = 0u; i < scenario->settings_count; i++) {
+        if (strcmp(study->value[i], scenario->settings[i].fallback) != 0) {
+            append_word(id, scenario->settings[i].key);
+            append_word(id, study->value[i]);
+        }
+    }
+    if (study->particles != scenario->particles) {
+        (void)snprintf(number, sizeof number, "%lu", (unsigned long)study->particles);
+        append_word(id, "particles");
+        append_word(id, number);
+    }
 }
 
 metric_t *verdict_add(verdict_t *verdict, const char *name, figure_t ours)

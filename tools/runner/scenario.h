@@ -44,6 +44,11 @@ const char *study_value(const study_t *study, const char *key);
 bool study_is(const study_t *study, const char *key, const char *value);
 double study_number(const study_t *study, const char *key);
 
+/* A name for the study among those of a campaign, fit for a file: scenario, filter, and what is not as by default but
+ * runs and seed. */
+#define STUDY_ID_MAX 256
+void study_id(const study_t *study, char *id);
+
 /* What `open` makes of a study: constant during the runs, shared by all threads. */
 typedef struct {
     void *own;                 /* the scenario's */

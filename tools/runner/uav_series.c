@@ -55,7 +55,7 @@ const char *const uav_trace_column[UAV_TRACE_COLUMNS] = {
 };
 
 /* A name for every column. */
-typedef char columns_agree[COLUMNS == UAV_COLUMNS && TRACE_COLUMNS == UAV_TRACE_COLUMNS ? 1 : -1];
+typedef char columns_agree[(int)COLUMNS == (int)UAV_COLUMNS && (int)TRACE_COLUMNS == (int)UAV_TRACE_COLUMNS ? 1 : -1];
 
 bool uav_is_shown(const uav_study_t *s, unsigned j)
 {

@@ -23,7 +23,7 @@ static bool open_study(const study_t *study, plan_t *plan, failure_t *failure)
     *plan = (plan_t){
         .own = s,
         .values = UAV_VALUES,
-        .cycles = s->filter_seconds,
+        .cycles = s->ekf ? 0u : s->filter_seconds, /* the baseline is not timed */
         .steps = s->seconds,
         .columns = UAV_COLUMNS,
         .column = uav_column,
@@ -138,8 +138,10 @@ static void show(const uav_study_t *s, const flights_t *all, run_output_t *out)
 {
     const uav_flight_t *ignored = has_ignorant_twin(s) ? &all->ignored : NULL;
 
-    memcpy(out->cycles_ns, all->flight.cycles_ns, s->filter_seconds * sizeof *out->cycles_ns);
-    memcpy(out->cycle, all->flight.cycle, s->filter_seconds * sizeof *out->cycle);
+    if (!s->ekf) {
+        memcpy(out->cycles_ns, all->flight.cycles_ns, s->filter_seconds * sizeof *out->cycles_ns);
+        memcpy(out->cycle, all->flight.cycle, s->filter_seconds * sizeof *out->cycle);
+    }
     uav_fill_series(s, &all->track, &all->flight, has_unresampled_twin(s) ? &all->unresampled : NULL, ignored,
                     out->series);
     uav_fill_trace(s, &all->track, &all->flight, ignored, out->trace);

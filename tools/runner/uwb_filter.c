@@ -1,5 +1,6 @@
 /* pflight on the ranges: constant velocity outdoors, odometry and a global start indoors, one Student-t range sensor
  * for both. */
+#include "cloud.h"
 #include "host_random.h"
 #include "uwb_range.h"
 
@@ -118,7 +119,7 @@ static bool check(pfl_status_t status, const char *call, size_t i, failure_t *fa
     return status >= 0 || fail(failure, EXIT_HARNESS, "range %zu: %s: %s", i, call, pfl_status_string(status));
 }
 
-static bool fly(const uwb_study_t *s, pfl_t *filter, float *estimate, uint32_t *cycles_ns, failure_t *failure)
+static bool fly(const uwb_study_t *s, pfl_t *filter, float *estimate, run_output_t *out, failure_t *failure)
 {
     const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
     pfl_health_t health;
@@ -137,13 +138,13 @@ static bool fly(const uwb_study_t *s, pfl_t *filter, float *estimate, uint32_t *
         }
         estimate[2u * i] = mean[0];
         estimate[2u * i + 1u] = mean[1];
-        cycles_ns[i] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
+        out->cycles_ns[i] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
+        out->cycle[i] = cycle_of(&health);
     }
     return true;
 }
 
-bool uwb_filter(const uwb_study_t *s, uint32_t run, float *estimate, uint32_t *cycles_ns, uint32_t *resampled,
-                failure_t *failure)
+bool uwb_filter(const uwb_study_t *s, uint32_t run, float *estimate, run_output_t *out, failure_t *failure)
 {
     pfl_range_t sensed = {
         .x_state = 0u,
@@ -156,16 +157,13 @@ bool uwb_filter(const uwb_study_t *s, uint32_t run, float *estimate, uint32_t *c
     const pfl_config_t config = make_config(s, run, &model, &sensor);
     const size_t bytes = PFL_ARENA_BYTES(config.particles, config.states, config.noises);
     void *arena = malloc(bytes);
-    pfl_health_t health = {0};
     pfl_t *filter;
 
     if (arena == NULL) {
         return fail(failure, EXIT_HARNESS, "no memory for %lu particles", (unsigned long)s->particles);
     }
     const bool flown = check(pfl_init(arena, bytes, &config, 0u, &filter), "pfl_init", 0u, failure) &&
-                       fly(s, filter, estimate, cycles_ns, failure) &&
-                       check(pfl_health(filter, &health), "pfl_health", s->ranges, failure);
-    *resampled = health.resampled;
+                       fly(s, filter, estimate, out, failure);
     free(arena);
     return flown;
 }

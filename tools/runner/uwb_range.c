@@ -103,26 +103,24 @@ static bool score(const uwb_study_t *s, const float *estimate, run_output_t *out
 static bool run_once(const plan_t *plan, uint32_t run, run_output_t *out, failure_t *failure)
 {
     const uwb_study_t *s = plan->own;
-    uint32_t resampled = 0u;
     float *estimate = malloc(2u * s->ranges * sizeof *estimate);
 
     if (estimate == NULL) {
         return fail(failure, EXIT_HARNESS, "out of memory");
     }
-    const bool done =
-        uwb_filter(s, run, estimate, out->cycles_ns, &resampled, failure) && score(s, estimate, out, failure);
+    const bool done = uwb_filter(s, run, estimate, out, failure) && score(s, estimate, out, failure);
     if (done) {
         out->hash = hash_floats(out->hash, estimate, 2u * s->ranges);
-        out->value[UWB_RESAMPLED] = (double)resampled / (double)s->ranges;
+        out->value[UWB_RESAMPLED] = (double)out->cycle[s->ranges - 1u].resampled / (double)s->ranges;
     }
     free(estimate);
     return done;
 }
 
 static const campaign_t campaign[] = {
-    {"pf", 20u, {"set=los_a1"}},
-    {"pf", 20u, {"set=nlos_a2"}},
-    {"pf", 20u, {"set=indoor"}},
+    {"pf", 20u, {"set=los_a1"}, 0u},
+    {"pf", 20u, {"set=nlos_a2"}, 0u},
+    {"pf", 20u, {"set=indoor"}, 0u},
 };
 
 const scenario_t uwb_range_scenario = {

@@ -43,9 +43,8 @@ extern const scenario_t uwb_range_scenario;
 /* Reads a set of the recordings into ranges and anchors. */
 bool uwb_load(uwb_study_t *s, const char *data, const char *set, failure_t *failure);
 
-/* Flies the filter over the ranges: estimates (x, y) after each of them, cycle times, number of resamplings. */
-bool uwb_filter(const uwb_study_t *s, uint32_t run, float *estimate, uint32_t *cycles_ns, uint32_t *resampled,
-                failure_t *failure);
+/* Flies the filter over the ranges: estimates (x, y) after each of them, and the cycles. */
+bool uwb_filter(const uwb_study_t *s, uint32_t run, float *estimate, run_output_t *out, failure_t *failure);
 
 /* Metrics of the runs' rmse, p95, max and resampled share. */
 enum { UWB_RMSE, UWB_P95, UWB_MAX, UWB_RESAMPLED, UWB_VALUES };
