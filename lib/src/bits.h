@@ -15,30 +15,37 @@
 #error "pflight needs floats evaluated as floats: use SSE math on i386, -fexcess-precision=fast on s390x"
 #endif
 
+/* The builtin stays one move also in firmware that is built with -ffreestanding or -fno-builtin. */
+#if defined(__GNUC__)
+#define PFL_COPY(to, from, bytes) ((void)__builtin_memcpy((to), (from), (bytes)))
+#else
+#define PFL_COPY(to, from, bytes) ((void)memcpy((to), (from), (bytes)))
+#endif
+
 static inline int32_t pfl_bits(float x)
 {
     int32_t i;
-    memcpy(&i, &x, sizeof i);
+    PFL_COPY(&i, &x, sizeof i);
     return i;
 }
 
 static inline float pfl_from_bits(int32_t i)
 {
     float x;
-    memcpy(&x, &i, sizeof x);
+    PFL_COPY(&x, &i, sizeof x);
     return x;
 }
 
 static inline uint32_t pfl_load_u32(const float *p)
 {
     uint32_t u;
-    memcpy(&u, p, sizeof u);
+    PFL_COPY(&u, p, sizeof u);
     return u;
 }
 
 static inline void pfl_store_u32(float *p, uint32_t u)
 {
-    memcpy(p, &u, sizeof u);
+    PFL_COPY(p, &u, sizeof u);
 }
 
 static inline bool pfl_is_finite(float x)

@@ -49,25 +49,25 @@ static inline float weight_of(float d)
 static void sum_lanes(float *row, const float *restrict a, uint32_t n)
 {
     float sum[LANES];
-    memcpy(sum, row, sizeof sum);
+    PFL_COPY(sum, row, sizeof sum);
     for (uint32_t i = 0u; i < n; i += LANES) {
         for (uint32_t l = 0u; l < LANES; l++) {
             sum[l] += a[i + l];
         }
     }
-    memcpy(row, sum, sizeof sum);
+    PFL_COPY(row, sum, sizeof sum);
 }
 
 static void product_lanes(float *row, const float *a, const float *b, uint32_t n)
 {
     float sum[LANES];
-    memcpy(sum, row, sizeof sum);
+    PFL_COPY(sum, row, sizeof sum);
     for (uint32_t i = 0u; i < n; i += LANES) {
         for (uint32_t l = 0u; l < LANES; l++) {
             sum[l] += a[i + l] * b[i + l];
         }
     }
-    memcpy(row, sum, sizeof sum);
+    PFL_COPY(row, sum, sizeof sum);
 }
 
 PFL_NOINLINE static void weigh_lanes(pfl_t *f, uint32_t first, uint32_t n)
@@ -88,13 +88,13 @@ PFL_NOINLINE static void weigh_lanes(pfl_t *f, uint32_t first, uint32_t n)
 static void mean_lanes(float *row, const float *restrict x, const float *restrict w, float centre, uint32_t n)
 {
     float sum[LANES];
-    memcpy(sum, row, sizeof sum);
+    PFL_COPY(sum, row, sizeof sum);
     for (uint32_t i = 0u; i < n; i += LANES) {
         for (uint32_t l = 0u; l < LANES; l++) {
             sum[l] += w[i + l] * (x[i + l] - centre);
         }
     }
-    memcpy(row, sum, sizeof sum);
+    PFL_COPY(row, sum, sizeof sum);
 }
 
 static bool is_circular(const pfl_t *f, uint32_t d)
