@@ -77,7 +77,7 @@ bool gaussian_condition(gaussian_t *belief, const double *c, const double *s, co
 {
     const int n = belief->n;
     double factor[GAUSSIAN_MAX2];
-    double gain[GAUSSIAN_MAX2];
+    double gain[GAUSSIAN_MAX2] = {0.0};
     double less[GAUSSIAN_MAX2];
 
     matrix_square_root(s, factor, m);
