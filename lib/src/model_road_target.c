@@ -1,5 +1,5 @@
-/* A target on a ring road, its motion turned with the road: models.h has the equations. Positions move along the road by
- * turning the unit vector from the center, so that no angle is ever formed. */
+/* A target on a road: models.h has the equations. On the ring, positions move along the road by turning the unit vector
+ * from the center, so that no angle is ever formed. */
 #include "pflight/models.h"
 
 #include "math_kernels.h"
@@ -66,36 +66,20 @@ void pfl_road_target_predict(void *user, const void *u, float dt_s, const pfl_ba
 void pfl_lane_target_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p)
 {
     const pfl_lane_target_t m = *(const pfl_lane_target_t *)user;
-    const float along = m.sigma_along * pfl_sqrtf(dt_s);
+    const float kick = m.sigma_along * pfl_sqrtf(dt_s);
     const float keep = pfl_expf(-dt_s / m.offset_time_s);
     const float spread = m.sigma_offset_m * pfl_sqrtf(1.0f - (keep * keep));
-    const float half_turn = (0.5f * dt_s) / m.radius_m;
-    float *restrict x = PFL_STATE(p, PFL_CV_X);
-    float *restrict y = PFL_STATE(p, PFL_CV_Y);
-    float *restrict vx = PFL_STATE(p, PFL_CV_VX);
-    float *restrict vy = PFL_STATE(p, PFL_CV_VY);
-    const float *restrict w_offset = PFL_NOISE(p, 0);
-    const float *restrict w_along = PFL_NOISE(p, 1);
+    const float half = 0.5f * dt_s;
+    float *restrict arc = PFL_STATE(p, PFL_LANE_ARC);
+    float *restrict speed = PFL_STATE(p, PFL_LANE_SPEED);
+    float *restrict offset = PFL_STATE(p, PFL_LANE_OFFSET);
+    const float *restrict w_along = PFL_NOISE(p, 0);
+    const float *restrict w_offset = PFL_NOISE(p, 1);
     (void)u;
     for (uint32_t i = 0u; i < p->n; i++) {
-        float s;
-        float c;
-        const float dx = x[i] - m.center_x_m;
-        const float dy = y[i] - m.center_y_m;
-        const float r = radius_of(dx, dy);
-        const float nx = dx / r;
-        const float ny = dy / r;
-        const float speed = ((vy[i] * nx) - (vx[i] * ny)) * (m.radius_m / r);
-        const float next = clip(speed + (along * w_along[i]), m.speed_min_mps, m.speed_max_mps);
-        const float offset = clip((keep * (r - m.radius_m)) + (spread * w_offset[i]), -m.half_width_m, m.half_width_m);
-        const float radius = m.radius_m + offset;
-        const float on_speed = next * (radius / m.radius_m);
-        pfl_sincos_kernel(half_turn * (speed + next), &s, &c);
-        const float ex = (nx * c) - (ny * s);
-        const float ey = (ny * c) + (nx * s);
-        x[i] = m.center_x_m + (radius * ex);
-        y[i] = m.center_y_m + (radius * ey);
-        vx[i] = -on_speed * ey;
-        vy[i] = on_speed * ex;
+        const float next = clip(speed[i] + (kick * w_along[i]), m.speed_min_mps, m.speed_max_mps);
+        arc[i] += half * (speed[i] + next);
+        speed[i] = next;
+        offset[i] = clip((keep * offset[i]) + (spread * w_offset[i]), -m.half_width_m, m.half_width_m);
     }
 }

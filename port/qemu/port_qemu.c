@@ -6,10 +6,11 @@
  * -icount shift=0 one count is one instruction. On silicon the same registers count at 84 MHz; take port/cortex_m.
  *
  * PFL_PORT_QEMU_CMSDK   TIMER0 of the mps2 boards instead: 25 MHz. Run with -icount shift=7, where an instruction is
- *                       128 ns, 3.2 counts; the contract's count is in instructions then, rounded.
+ *                       128 ns and 16 counts are 5 instructions.
  */
 #include "pflight/port.h"
 
+#define MASK 0xFFFFFFFFu
 #define REGISTER(address) (*(volatile uint32_t *)(uintptr_t)(address))
 
 #if defined(PFL_PORT_QEMU_CMSDK)
@@ -27,13 +28,9 @@ static void start(void)
     }
 }
 
-/* Counts down; 16 counts are 5 instructions. The mask is a power of two that 2^32 * 5 / 16 covers. */
-#define MASK 0x3FFFFFFFu
-
 uint32_t pfl_port_cycles(void)
 {
-    const uint64_t counts = 0xFFFFFFFFu - REGISTER(TIMER_VALUE);
-    return (uint32_t)(((counts * 5u) + 8u) / 16u) & MASK;
+    return 0xFFFFFFFFu - REGISTER(TIMER_VALUE); /* it counts down */
 }
 
 #else
@@ -43,7 +40,6 @@ uint32_t pfl_port_cycles(void)
 #define TIM2_CNT 0x40000024u
 #define TIM2_PSC 0x40000028u
 #define TIM2_ARR 0x4000002Cu
-#define MASK 0xFFFFFFFFu
 
 static void start(void)
 {

@@ -1,5 +1,7 @@
 /* Prints a hash of everything the library computes, one line a part: test/checks/bits compares the lines of many
  * compilers with golden.txt. Inputs come from integers only, never from a C library's mathematics. */
+#include "hashing.h"
+
 #include "pflight/pflight.h"
 
 #include <inttypes.h>
@@ -23,13 +25,13 @@ static float out_a[INPUTS], out_b[INPUTS], in_a[INPUTS], in_b[INPUTS];
 
 /* ---- Hash and inputs ------------------------------------------------------------------------------------------ */
 
-static void begin(uint64_t seed)
+void begin(uint64_t seed)
 {
     state = seed;
     hash = 0xCBF29CE484222325u;
 }
 
-static void end(const char *part)
+void end(const char *part)
 {
     printf("%-28s %016" PRIx64 "\n", part, hash);
 }
@@ -41,7 +43,7 @@ static void mix_u32(uint32_t u)
 }
 
 /* The bits of a NaN are the processor's own, so all NaN count as one. */
-static void mix(float x)
+void mix(float x)
 {
     uint32_t u;
     memcpy(&u, &x, sizeof u);
@@ -66,7 +68,7 @@ static uint32_t next_u32(void)
 }
 
 /* low .. high, in steps of 2^-24 of it */
-static float between(float low, float high)
+float between(float low, float high)
 {
     const float share = (float)(int32_t)(next_u32() >> 8) * 5.9604644775390625e-8f;
     return low + ((high - low) * share);
@@ -579,5 +581,6 @@ int main(void)
     of_land_vehicle();
     of_constant_velocity();
     of_odometry();
+    of_modules();
     return 0;
 }

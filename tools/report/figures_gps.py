@@ -33,7 +33,7 @@ def draw_error(variant, lines, **options):
             axes.plot(mean["t_s"], mean["error_m"], color=color, label=name)
         axes.set(xlabel="time [s]", ylabel="position error [m]", **options)
         if options.get("yscale") == "log":
-            axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+            style.plain_log(axes.yaxis)
         else:
             axes.set_ylim(bottom=0.0)
         style.legend(axes)

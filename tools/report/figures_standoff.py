@@ -33,7 +33,7 @@ def draw_orbits(guidance):
         axes.plot(run["target_x_m"], run["target_y_m"], color=style.INK, linewidth=1.4, label="target")
         axes.set(xlabel="x [m]", ylabel="y [m]")
         style.to_scale(figure, axes)
-        style.legend(axes, 5, handletextpad=0.4)
+        style.legend(axes, 3)
         return figure
     return draw
 
@@ -89,7 +89,7 @@ def draw_distance(results):
         axes.plot(run["t_s"], distance, color=color, linewidth=1.3, label=f"UAV {i} to target")
     axes.plot(run["t_s"], run["distance_wanted_m"], color=style.INK, linestyle="--", label="wanted")
     axes.set(xlabel="time [s]", ylabel="distance [m]", ylim=(0.0, None))
-    style.legend(axes, 3)
+    style.legend(axes)
     return figure
 
 
@@ -138,10 +138,13 @@ TOPICS = (
           (Figure("standoff-position", "Standoff: position error over time", f"Mean over the runs. {GREY}",
                   draw_error("position_error_m", "position error [m]")),
            Figure("standoff-velocity", "Standoff: velocity error over time", f"Mean over the runs. {GREY}",
-                  draw_error("velocity_error_mps", "velocity error [m/s]")),
-           Figure("standoff-particles", "Standoff: distance against the number of particles (the paper's Figure 5)",
-                  "Mean wanted distance in the outages, before the limit of its rate.", draw_particles)),
-          lambda study: study.settings["guidance"] == "lvfg" and study.settings["visibility"] == "inout"),
+                  draw_error("velocity_error_mps", "velocity error [m/s]"))),
+          lambda study: study.settings["guidance"] == "lvfg" and study.settings["visibility"] == "inout" and
+          study.settings["particles"] == PAGE["particles"]),
+    Topic("standoff-particles", "How many particles?",
+          (Figure("standoff-particles", "Standoff: distance against the number of particles (the paper's Figure 5)",
+                  "Mean wanted distance in the outages, before the limit of its rate.", draw_particles),),
+          lambda study: study.settings["particles"] != PAGE["particles"]),
     Topic("standoff-guidance", "Keeping the distance: guidance laws compared",
           (Figure("standoff-orbits-lvfg", "Standoff: orbits of the UAVs and the target, LVFG", "One run.",
                   draw_orbits("lvfg")),

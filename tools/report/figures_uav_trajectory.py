@@ -161,7 +161,7 @@ def draw_wind_error(results):
         mean = plain(results, "wind", **settings).series
         axes.plot(mean["t_s"], mean["wind_error_mps"], color=color, label=name)
     axes.set(xlabel="time [s]", ylabel="error of the wind [m/s]", yscale="log")
-    axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    style.plain_log(axes.yaxis)
     style.legend(axes, 3)
     return figure
 
@@ -173,7 +173,7 @@ def draw_wind_forecast(results):
     axes.plot(mean["t_s"], mean["ahead_error_m"], color=style.OURS, label="wind inferred")
     axes.plot(mean["t_s"], mean["ahead_std_m"], color=style.OURS, linestyle="--", label="its standard deviation")
     axes.set(xlabel="time [s]", ylabel="error of the forecast [m]", ylim=(0.0, None), xlim=(30.0, 60.0))
-    style.legend(axes, 3)
+    style.legend(axes)
     return figure
 
 

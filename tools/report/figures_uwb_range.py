@@ -50,7 +50,7 @@ def draw_distribution(results):
         axes.plot(error, share, color=color, label=SETS[name])
     axes.set(xscale="log", xlabel="horizontal error [m]", ylabel="share of errors below", ylim=(0.0, 1.0))
     axes.set_xlim(left=1e-2)
-    axes.xaxis.set_major_formatter(lambda value, _: f"{value:g}")
+    style.plain_log(axes.xaxis)
     style.legend(axes)
     return figure
 

@@ -3,6 +3,8 @@ import html
 import math
 import pathlib
 
+UNCOMPARED_SHOWN = 8  # a longer table of figures that nothing is compared with folds
+BESIDE_MAX = 2  # studies whose tables fit beside a single figure
 STYLE = pathlib.Path(__file__).with_name("page.css")
 
 
@@ -26,7 +28,7 @@ def band(lo, hi):
     if lo is None and hi is None:
         return ""
     # A band as narrow as rounding cannot be read off four decimals.
-    digits = 7 if lo is not None and hi is not None and hi - lo < 1e-3 else 4
+    digits = 7 if lo is not None and hi is not None and hi - lo < 1e-3 <= abs(hi) else 4
     if lo is None or (lo == 0.0 and hi is not None):
         return f"≤ {number(hi, digits)}"
     if hi is None:
@@ -41,7 +43,7 @@ def badge(verdict):
 
 
 def metric_row(name, metric):
-    cells = (("ours", number(metric["mean"])), ("± std. error", number(metric["stderr"])),
+    cells = (("ours", number(metric["mean"])), ("± error", number(metric["stderr"])),
              ("paper", number(metric["paper"])), ("reference", number(metric["reference"])),
              ("accepted", band(metric["lo"], metric["hi"]) if metric["verdict"] else ""))
     columns = "".join(f'<td data-label="{label}">{escape(value)}</td>' if value else "<td></td>"
@@ -49,12 +51,27 @@ def metric_row(name, metric):
     return f'<tr><th scope="row">{escape(name)}</th>{columns}<td>{badge(metric["verdict"])}</td></tr>'
 
 
-def metrics_table(study):
+def table(rows):
     heads = "".join(f'<th scope="col">{head}</th>' for head in
-                    ("metric", "ours", "± std. error", "paper", "reference", "accepted", "verdict"))
-    rows = "".join(metric_row(name, metric) for name, metric in study.metrics.items())
+                    ("metric", "ours", "± error", "paper", "reference", "accepted", "verdict"))
+    return f"<table><thead><tr>{heads}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+
+
+def is_compared(metric):
+    return metric["verdict"] is not None or metric["paper"] is not None or metric["reference"] is not None
+
+
+def metrics_table(study):
+    """What there is to compare with stands first; the rest, if there is both, folds."""
+    compared = [metric_row(name, metric) for name, metric in study.metrics.items() if is_compared(metric)]
+    others = [metric_row(name, metric) for name, metric in study.metrics.items() if not is_compared(metric)]
+    tables = table(compared) if compared else ""
+    if others and (compared or len(others) > UNCOMPARED_SHOWN):
+        tables += f"<details><summary>{len(others)} metrics without a comparison</summary>{table(others)}</details>"
+    elif others:
+        tables = table(others)
     return (f'<div class="wide" tabindex="0" role="region" aria-label="Metrics of {escape(study.id)}">'
-            f"<table><thead><tr>{heads}</tr></thead><tbody>{rows}</tbody></table></div>")
+            f"{tables}</div>")
 
 
 def microseconds(timing, prefix=""):
@@ -108,7 +125,7 @@ def figure_section(figure, svg, lacks):
 def topic_section(topic, figures, studies):
     grid = f'<div class="figures">{"".join(figures)}</div>' if figures else ""
     tables = f'<div>{"".join(map(study_section, studies))}</div>' if studies else ""
-    kind = "topic single" if len(figures) == 1 and studies else "topic"
+    kind = "topic single" if len(figures) == 1 and 0 < len(studies) <= BESIDE_MAX else "topic"
     return (f'<section class="{kind}" aria-labelledby="{topic.id}-head"><h3 id="{topic.id}-head">'
             f"{escape(topic.title)}</h3>{grid}{tables}</section>")
 

@@ -14,20 +14,20 @@ INK, MUTED, GRID, SURFACE = (ROLES[name] for name in ("ink", "muted", "grid", "s
 OURS, OTHER, THIRD, FOURTH = (ROLES[name] for name in ("ours", "other", "third", "fourth"))
 MEASURED, BAND = ROLES["measured"], ROLES["band"]
 
-WIDTH_IN = 4.9
-HEIGHT_IN = 3.3
+WIDTH_IN = 4.6
+HEIGHT_IN = 3.2
 
 RC = {
     "figure.figsize": (WIDTH_IN, HEIGHT_IN), "figure.facecolor": "none", "savefig.facecolor": "none",
     "figure.constrained_layout.use": True,
     "axes.facecolor": "none", "axes.edgecolor": MUTED, "axes.labelcolor": INK, "axes.linewidth": 0.7,
     "axes.spines.top": False, "axes.spines.right": False, "axes.grid": True, "axes.axisbelow": True,
-    "axes.titlesize": 10, "axes.titlelocation": "left", "axes.titlecolor": INK, "axes.labelsize": 10,
+    "axes.titlesize": 10, "axes.titlelocation": "left", "axes.titlecolor": INK, "axes.labelsize": 10.5,
     "grid.color": GRID, "grid.linewidth": 0.7,
     "xtick.color": MUTED, "ytick.color": MUTED, "xtick.labelcolor": INK, "ytick.labelcolor": INK,
-    "xtick.labelsize": 9.5, "ytick.labelsize": 9.5, "xtick.major.size": 3, "ytick.major.size": 3,
-    "text.color": INK, "font.size": 10, "font.family": "sans-serif",
-    "legend.frameon": False, "legend.fontsize": 9.5, "legend.handlelength": 1.6, "legend.borderaxespad": 0.2,
+    "xtick.labelsize": 10, "ytick.labelsize": 10, "xtick.major.size": 3, "ytick.major.size": 3,
+    "text.color": INK, "font.size": 10.5, "font.family": "sans-serif",
+    "legend.frameon": False, "legend.fontsize": 10, "legend.handlelength": 1.6, "legend.borderaxespad": 0.2,
     "lines.linewidth": 1.6, "lines.solid_capstyle": "round", "patch.linewidth": 0,
     "svg.fonttype": "none", "svg.hashsalt": "pflight", "path.simplify_threshold": 0.3,
 }
@@ -45,13 +45,23 @@ def to_scale(figure, axes):
     axes.autoscale_view()
     (left, right), (bottom, top) = axes.get_xlim(), axes.get_ylim()
     wanted = 0.9 + (WIDTH_IN - 0.8) * (top - bottom) / (right - left)
-    figure.set_figheight(min(max(wanted, 2.2), 5.0))
+    figure.set_figheight(min(max(wanted, 2.2), 4.8))
     axes.set_aspect("equal", adjustable="datalim" if wanted < 2.2 else "box", anchor="SW")
 
 
-def legend(axes, columns=2, **options):
+def plain_log(axis):
+    """A logarithmic axis with numbers that people read."""
+    from matplotlib.ticker import LogLocator, NullFormatter, NullLocator
+
+    axis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axis.set_major_formatter(lambda value, _: f"{value:g}")
+    axis.set_minor_locator(NullLocator())
+    axis.set_minor_formatter(NullFormatter())
+
+
+def legend(axes, columns=2):
     """Above the axes, where it hides nothing."""
-    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, columnspacing=1.2, **options)
+    axes.legend(loc="lower left", bbox_to_anchor=(0.0, 1.0), ncols=columns, columnspacing=1.2)
 
 
 def dots(axes, x, y, color, size=1.6, alpha=0.55, label=None):

@@ -14,7 +14,11 @@ static const setting_t settings[] = {
     {"truth", "paper|calm", 0.0, 0.0, "paper", "how the target drives: restless as calibrated to the paper, or calm"},
     {"tries", NULL, 1.0, 256.0, "4", "cpf, cv: draws a particle has to stay on the road"},
     {"fallback", "slide|clamp|bounce|weight|keep", 0.0, 0.0, "slide", "cpf, cv: what then happens to it"},
-    {"theta", NULL, 0.0, 1.0, "1", "pf: resample at a visible step when the effective sample size <= theta N"},
+    {"theta", NULL, 0.0, 1.0, "0",
+     "pf: resample at a visible step when the effective sample size <= theta N; 0: 1, lane 0.5"},
+    {"kernel", NULL, 0.0, 0.99, "0.9", "lane: width of the kernel step after resampling; 0: none"},
+    {"parts", NULL, 1.0, 64.0, "8", "lane: parts in which the first measurement after a gap is fused"},
+    {"reach", "sigma|farthest", 0.0, 0.0, "sigma", "lane: 3 standard deviations, as the EKF has; cv, road: farthest"},
     {"qa", NULL, 0.0, 10.0, "0", "acceleration noise along the road (cv: on each axis) in m/s^2; 0: the page's"},
     {"ql", NULL, 0.0, 10.0, "0", "road: acceleration noise across in m/s^2; 0: the page's"},
 };
@@ -38,6 +42,20 @@ static unsigned choice_index(const study_t *study, const char *key)
     return index;
 }
 
+/* Settings that the page does not change: at their defaults? */
+static bool is_as_page(const study_t *study)
+{
+    static const char *const keys[] = {"theta", "kernel", "parts", "reach", "qa", "ql"};
+    bool same = true;
+
+    for (size_t k = 0u; k < sizeof keys / sizeof keys[0]; k++) {
+        for (size_t i = 0u; i < sizeof settings / sizeof settings[0]; i++) {
+            same = same && (strcmp(settings[i].key, keys[k]) != 0 || study_is(study, keys[k], settings[i].fallback));
+        }
+    }
+    return same;
+}
+
 /* The page's noises where the command line has none. */
 static void read_noises(const study_t *study, standoff_study_t *s)
 {
@@ -55,12 +73,19 @@ static void read_noises(const study_t *study, standoff_study_t *s)
     s->sigma_across = across > 0.0 ? across : s->sigma_across;
 }
 
+static bool read_whole(const study_t *study, const char *key, uint32_t *value, failure_t *failure)
+{
+    const double number = study_number(study, key);
+
+    *value = (uint32_t)number;
+    return !(number > floor(number)) ||
+           fail(failure, EXIT_USAGE, "--set %s=%s: give a whole number", key, study_value(study, key));
+}
+
 static bool read_settings(const study_t *study, standoff_study_t *s, failure_t *failure)
 {
-    const double tries = study_number(study, "tries");
-
-    if (tries > floor(tries)) {
-        return fail(failure, EXIT_USAGE, "--set tries=%s: give a whole number", study_value(study, "tries"));
+    if (!read_whole(study, "tries", &s->tries, failure) || !read_whole(study, "parts", &s->parts, failure)) {
+        return false;
     }
     s->ekf = strncmp(study->filter, "ekf", 3u) == 0;
     s->constrained = strncmp(study->filter, "cpf", 3u) == 0;
@@ -71,10 +96,13 @@ static bool read_settings(const study_t *study, standoff_study_t *s, failure_t *
     s->outages = study_is(study, "visibility", "inout");
     s->euler_plant = study_is(study, "plant", "euler");
     s->calm = study_is(study, "truth", "calm");
-    s->tries = (uint32_t)tries;
-    s->ess_ratio = study_number(study, "theta");
+    s->kernel_width = study_number(study, "kernel");
+    s->farthest = study_is(study, "reach", "farthest");
     s->particles = study->particles;
     s->seed = study->seed;
+    const double theta = study_number(study, "theta");
+    s->ess_ratio = theta > 0.0 ? theta : (s->motion == MOTION_LANE ? 0.5 : 1.0);
+    s->as_page = is_as_page(study);
     read_noises(study, s);
     return true;
 }
@@ -156,17 +184,41 @@ static bool run_once(const plan_t *plan, uint32_t run, run_output_t *out, failur
 }
 
 static const campaign_t campaign[] = {
-    {"pf", 200u, {NULL}},
-    {"cpf", 200u, {NULL}},
-    {"cpf-multi", 200u, {NULL}},
-    {"ekf-multi", 200u, {NULL}},
-    {"cpf-multi", 200u, {"motion=lane"}},
-    {"cpf-multi", 200u, {"motion=lane", "truth=calm"}},
-    {"cpf-multi", 200u, {"visibility=in"}},
-    {"cpf-multi", 200u, {"guidance=nmpc", "visibility=in"}},
-    {"cpf-multi", 200u, {"guidance=nmpc"}},
-    {"cpf-multi", 200u, {"guidance=lvfg+"}},
-    {"cpf-multi", 200u, {"guidance=nmpc+"}},
+    /* Table II, and the yardstick */
+    {"pf", 200u, {NULL}, 0u},
+    {"cpf", 200u, {NULL}, 0u},
+    {"cpf-multi", 200u, {NULL}, 0u},
+    {"ekf", 200u, {NULL}, 0u},
+    {"ekf-multi", 200u, {NULL}, 0u},
+    {"pf", 200u, {"truth=calm"}, 0u},
+    {"cpf", 200u, {"truth=calm"}, 0u},
+    {"cpf-multi", 200u, {"truth=calm"}, 0u},
+    {"ekf-multi", 200u, {"truth=calm"}, 0u},
+    /* Table III */
+    {"cpf-multi", 200u, {"visibility=in"}, 0u},
+    {"cpf-multi", 200u, {"visibility=in", "guidance=nmpc"}, 0u},
+    {"cpf-multi", 200u, {"visibility=in", "guidance=lvfg+"}, 0u},
+    {"cpf-multi", 200u, {"visibility=in", "guidance=nmpc+"}, 0u},
+    {"cpf-multi", 200u, {"guidance=nmpc"}, 0u},
+    {"cpf-multi", 200u, {"guidance=lvfg+"}, 0u},
+    {"cpf-multi", 200u, {"guidance=nmpc+"}, 0u},
+    /* models, and tries */
+    {"cpf-multi", 200u, {"motion=road"}, 0u},
+    {"cpf-multi", 200u, {"motion=road", "truth=calm"}, 0u},
+    {"cpf-multi", 200u, {"motion=lane"}, 0u},
+    {"cpf-multi", 200u, {"motion=lane", "truth=calm"}, 0u},
+    {"cpf", 200u, {"tries=1"}, 0u},
+    {"cpf", 200u, {"tries=64"}, 0u},
+    {"cpf-multi", 200u, {"tries=1"}, 100u},
+    /* Figure 5 */
+    {"cpf", 200u, {NULL}, 25u},
+    {"cpf", 200u, {NULL}, 50u},
+    {"cpf", 200u, {NULL}, 100u},
+    {"cpf", 200u, {NULL}, 800u},
+    {"cpf-multi", 200u, {NULL}, 25u},
+    {"cpf-multi", 200u, {NULL}, 50u},
+    {"cpf-multi", 200u, {NULL}, 100u},
+    {"cpf-multi", 200u, {NULL}, 800u},
 };
 
 const scenario_t standoff_scenario = {

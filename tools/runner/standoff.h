@@ -46,8 +46,12 @@ typedef struct {
     bool calm;
     uint32_t tries;
     double ess_ratio;    /* 1: resample at every visible step */
+    double kernel_width; /* lane: of the kernel step after resampling; 0: none */
+    uint32_t parts;      /* lane: the first measurement after a gap is fused in so many */
+    bool farthest;       /* lane: the reach is that of the farthest particle, as with the other motions */
     double sigma_along;  /* accelerations of the model, held over a step [m/s^2] */
     double sigma_across; /* cv: not used, it has one for both axes */
+    bool as_page;        /* none of the settings above from ess_ratio on was changed */
     uint32_t particles;
     uint64_t seed;
 } standoff_study_t;
@@ -118,10 +122,18 @@ void standoff_pf_close(standoff_pf_t *pf);
 
 /* A filter cycle; sight: of each UAV, null in an outage. */
 bool standoff_pf_step(standoff_pf_t *pf, unsigned k, const standoff_sight_t *sight, standoff_belief_t *belief,
-                      uint32_t *cycles_ns, failure_t *failure);
+                      uint32_t *cycles_ns, cycle_t *cycle, failure_t *failure);
 
 /* Draws per particle and step, share of particles that fell back, share of those with weight that were off the road. */
 void standoff_pf_counts(const standoff_pf_t *pf, double *draws, double *fallback, double *off_road);
+
+/* ---- standoff_lane.c: particles in the road's coordinates ------------------------------------------------------------ */
+
+pfl_lane_target_t standoff_lane_model(double sigma_along);
+void standoff_lane_start(const double *prior, float *start);       /* the prior's mean: PFL_LANE_STATES */
+void standoff_lane_draw(const float *start, const pfl_batch_t *p); /* and particles around it */
+void standoff_lane_loglik(void *user, const void *z, const pfl_view_t *p, float *ll); /* user: pfl_range_bearing_t */
+void standoff_lane_belief(const float *mean, const float *cov, standoff_belief_t *belief); /* reach: 3 sigma */
 
 /* ---- standoff_ekf.c ------------------------------------------------------------------------------------------------ */
 
@@ -185,6 +197,18 @@ enum { STANDOFF_POSITION_PF = STANDOFF_FLIGHT_VALUES, STANDOFF_POSITION_CPF, STA
 bool standoff_has_pf(const standoff_study_t *s);
 bool standoff_has_cpf(const standoff_study_t *s);
 bool standoff_has_ekf(const standoff_study_t *s);
+
+/* What the paper and the page say of a figure, which goes by the column that it is made of. */
+typedef struct {
+    const char *key; /* the settings, in words */
+    unsigned figure;
+    double paper;            /* its truth is the page's first */
+    double ours, limit;      /* the page's reference and its acceptance, with that truth */
+    double calm, calm_limit; /* and with the calm one */
+} standoff_reference_t;
+
+/* standoff_reference.c; null when nothing is said. */
+const standoff_reference_t *standoff_reference(const char *key, unsigned figure);
 
 void standoff_judge(const plan_t *plan, table_t runs, verdict_t *verdict);
 

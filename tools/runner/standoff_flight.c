@@ -133,7 +133,7 @@ static void record_end(flight_t *f)
 
 /* ---- The loop ----------------------------------------------------------------------------------------------------- */
 
-static bool filter_step(flight_t *f, unsigned k, uint32_t *cycles_ns, failure_t *failure)
+static bool filter_step(flight_t *f, unsigned k, uint32_t *cycles_ns, cycle_t *cycle, failure_t *failure)
 {
     const bool visible = !f->s->outages || !standoff_is_out(k);
     standoff_sight_t sight[STANDOFF_UAVS];
@@ -142,7 +142,7 @@ static bool filter_step(flight_t *f, unsigned k, uint32_t *cycles_ns, failure_t 
         sight[i] = standoff_see(f->track, k, i, &f->uav[i]);
     }
     if (f->pf != NULL) {
-        return standoff_pf_step(f->pf, k, visible ? sight : NULL, &f->belief, cycles_ns, failure);
+        return standoff_pf_step(f->pf, k, visible ? sight : NULL, &f->belief, cycles_ns, cycle, failure);
     }
     const uint32_t begin = pfl_port_cycles();
     const bool done = standoff_ekf_step(f->s, visible ? sight : NULL, &f->ekf, &f->belief);
@@ -155,13 +155,15 @@ static bool fly(flight_t *f, run_output_t *out, failure_t *failure)
 {
     for (unsigned k = 1u; k <= STANDOFF_STEPS; k++) {
         uint32_t cycles_ns = 0u;
-        if (!filter_step(f, k, &cycles_ns, failure) ||
+        cycle_t cycle = {0};
+        if (!filter_step(f, k, &cycles_ns, &cycle, failure) ||
             !standoff_pilot_step(f->s, f->uav, &f->belief, &f->pilot, f->command, failure)) {
             return false;
         }
         record(f, k);
         if (out != NULL) {
             out->cycles_ns[k - 1u] = cycles_ns;
+            out->cycle[k - 1u] = cycle;
             for (int d = 0; d < TARGET_STATES; d++) {
                 const float x = (float)f->belief.target[d];
                 out->hash = hash_floats(out->hash, &x, 1u);

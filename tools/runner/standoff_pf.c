@@ -1,16 +1,15 @@
 /* pflight as the tracker of `standoff`: motion models, the road as a constraint, and one sensor for each UAV. */
+#include "cloud.h"
 #include "host_random.h"
 #include "standoff.h"
 
 #include <math.h>
 #include <stdlib.h>
 
-#define OFFSET_SIGMA_M 0.7 /* of the target around the center line, as the EKF has it */
-#define OFFSET_KEPT 0.9    /* of it in one step */
-#define ON_ROAD_M 1e-4     /* rounding that still counts as on the road */
+#define ON_ROAD_M 1e-4 /* rounding that still counts as on the road */
 
-/* Sensors: one for each UAV, and the road itself for fallback=weight. */
-enum { SENSOR_ROAD = STANDOFF_UAVS, SENSORS };
+/* Sensors: one for each UAV, the same with part of the weight, and the road itself for fallback=weight. */
+enum { SENSOR_PART = STANDOFF_UAVS, SENSOR_ROAD = 2 * STANDOFF_UAVS, SENSORS };
 
 /* The motion stands first: the ready models take a pointer to the whole for a pointer to it. */
 typedef struct {
@@ -19,8 +18,8 @@ typedef struct {
         pfl_road_target_t road;
         pfl_lane_target_t lane;
     } motion;
-    float prior[TARGET_STATES];
-    bool on_road; /* the prior's draws are clamped to it */
+    float start[TARGET_STATES]; /* mean of the prior */
+    bool on_road;               /* the prior's draws are clamped to it */
     pfl_ring_t ring;
 } model_t;
 
@@ -35,12 +34,15 @@ struct standoff_pf {
     model_t model;
     road_t road;
     pfl_range_bearing_t seen;
+    pfl_range_bearing_t seen_in_part;
     pfl_sensor_t sensor[SENSORS];
     pfl_constraint_t constraint;
+    pfl_kernel_t kernel;
     pfl_config_t config;
     void *arena;
     pfl_t *filter;
     float *log_weights;
+    bool in_sight; /* the target was seen the step before */
     unsigned steps;
     uint64_t off_road;
 };
@@ -56,12 +58,17 @@ static void draw_prior(void *user, const pfl_batch_t *p)
         float *x = PFL_STATE(p, d);
         const float *w = PFL_NOISE(p, d);
         for (uint32_t i = 0u; i < p->n; i++) {
-            x[i] = model->prior[d] + sigma[d] * w[i];
+            x[i] = model->start[d] + sigma[d] * w[i];
         }
     }
     if (model->on_road) {
         pfl_ring_clamp(&model->ring, p);
     }
+}
+
+static void draw_on_lane(void *user, const pfl_batch_t *p)
+{
+    standoff_lane_draw(((const model_t *)user)->start, p);
 }
 
 static void keep_off(void *user, const pfl_batch_t *p)
@@ -114,7 +121,7 @@ static void set_model(standoff_pf_t *pf, const double *prior)
     model->on_road = s->constrained;
     model->ring = ring_road;
     for (int d = 0; d < TARGET_STATES; d++) {
-        model->prior[d] = (float)prior[d];
+        model->start[d] = (float)prior[d];
     }
     if (s->motion == MOTION_CV) {
         model->motion.cv = (pfl_constant_velocity_t){.sigma_accel = density(s->sigma_along)};
@@ -126,15 +133,8 @@ static void set_model(standoff_pf_t *pf, const double *prior)
             .sigma_along = density(s->sigma_along),
         };
     } else {
-        model->motion.lane = (pfl_lane_target_t){
-            .radius_m = (float)ROAD_CENTER_LINE_M,
-            .half_width_m = (float)(0.5 * (ROAD_OUTER_M - ROAD_INNER_M)),
-            .sigma_along = density(s->sigma_along),
-            .sigma_offset_m = (float)OFFSET_SIGMA_M,
-            .offset_time_s = (float)(-STANDOFF_PERIOD_S / log(OFFSET_KEPT)),
-            .speed_min_mps = -(float)INFINITY,
-            .speed_max_mps = (float)INFINITY,
-        };
+        model->motion.lane = standoff_lane_model(s->sigma_along);
+        standoff_lane_start(prior, model->start);
     }
 }
 
@@ -154,6 +154,29 @@ static void set_road(standoff_pf_t *pf)
     };
 }
 
+static void set_sensors(standoff_pf_t *pf)
+{
+    const double part = sqrt(1.0 / (double)pf->study->parts);
+    const bool lane = pf->study->motion == MOTION_LANE;
+
+    for (unsigned i = 0u; i < STANDOFF_UAVS; i++) {
+        pf->sensor[i].loglik = lane ? standoff_lane_loglik : pfl_range_bearing_loglik;
+        pf->sensor[SENSOR_PART + i] = pf->sensor[i];
+        pf->sensor[i].user = &pf->seen;
+        pf->sensor[SENSOR_PART + i].user = &pf->seen_in_part;
+    }
+    pf->sensor[SENSOR_ROAD] = (pfl_sensor_t){.loglik = road_loglik, .user = &pf->road};
+    pf->seen = (pfl_range_bearing_t){
+        .x_state = 0u,
+        .y_state = 1u,
+        .inv_sigma_range = (float)(1.0 / SENSOR_RANGE_SIGMA_M),
+        .inv_sigma_bearing = (float)(1.0 / SENSOR_BEARING_SIGMA_RAD),
+    };
+    pf->seen_in_part = pf->seen;
+    pf->seen_in_part.inv_sigma_range *= (float)part;
+    pf->seen_in_part.inv_sigma_bearing *= (float)part;
+}
+
 static void set_config(standoff_pf_t *pf, uint32_t run)
 {
     static const pfl_predict_fn predict[] = {
@@ -162,32 +185,28 @@ static void set_config(standoff_pf_t *pf, uint32_t run)
         [MOTION_LANE] = pfl_lane_target_predict,
     };
     const standoff_study_t *s = pf->study;
+    const bool lane = s->motion == MOTION_LANE;
     host_random_t random;
 
-    pf->seen = (pfl_range_bearing_t){
-        TARGET_X,
-        TARGET_Y,
-        (float)(1.0 / SENSOR_RANGE_SIGMA_M),
-        (float)(1.0 / SENSOR_BEARING_SIGMA_RAD),
+    pf->kernel = (pfl_kernel_t){
+        .width = (float)s->kernel_width,
+        .states_mask = (1u << PFL_LANE_ARC) | (1u << PFL_LANE_SPEED), /* the offset keeps to the road */
     };
-    for (unsigned i = 0u; i < STANDOFF_UAVS; i++) {
-        pf->sensor[i] = (pfl_sensor_t){.loglik = pfl_range_bearing_loglik, .user = &pf->seen};
-    }
-    pf->sensor[SENSOR_ROAD] = (pfl_sensor_t){.loglik = road_loglik, .user = &pf->road};
     host_random_start(&random, s->seed, run, RANDOM_FILTER_SEED);
     pf->config = (pfl_config_t){
         .abi = PFL_ABI,
         .particles = s->particles,
-        .states = TARGET_STATES,
+        .states = lane ? PFL_LANE_STATES : TARGET_STATES,
         .noises = 2u,
         .sensor_count = SENSORS,
-        .moments = PFL_MOMENTS_MEAN,
+        .moments = lane ? PFL_MOMENTS_FULL : PFL_MOMENTS_MEAN,
         .ess_ratio = 0.0f, /* the step below resamples, once for all UAVs */
         .seed = host_random_u64(&random),
         .sensors = pf->sensor,
         .constraint = s->constrained && s->motion == MOTION_CV ? &pf->constraint : NULL,
+        .kernel = lane && s->kernel_width > 0.0 ? &pf->kernel : NULL,
         .predict = predict[s->motion],
-        .draw = draw_prior,
+        .draw = lane ? draw_on_lane : draw_prior,
         .user = &pf->model,
     };
 }
@@ -226,6 +245,7 @@ standoff_pf_t *standoff_pf_open(const standoff_study_t *s, uint32_t run, const d
     }
     set_model(pf, prior);
     set_road(pf);
+    set_sensors(pf);
     set_config(pf, run);
     if (!check(pfl_init(pf->arena, bytes, &pf->config, 0u, &pf->filter), "pfl_init", 0u, failure)) {
         standoff_pf_close(pf);
@@ -247,32 +267,77 @@ static bool weigh_road(standoff_pf_t *pf, unsigned k, uint64_t t_us, failure_t *
     return pf->road.rescue || check(status, "pfl_update", k, failure);
 }
 
-static bool fuse(standoff_pf_t *pf, unsigned k, uint64_t t_us, const standoff_sight_t *sight, failure_t *failure)
+static bool update(standoff_pf_t *pf, unsigned k, unsigned first_sensor, const standoff_sight_t *sight,
+                   failure_t *failure)
 {
-    const standoff_study_t *s = pf->study;
+    const uint64_t t_us = (uint64_t)k * STANDOFF_PERIOD_US;
 
-    for (unsigned i = 0u; i < s->uavs; i++) {
+    for (unsigned i = 0u; i < pf->study->uavs; i++) {
         const pfl_range_bearing_z_t z = {(float)sight[i].from_x_m, (float)sight[i].from_y_m, (float)sight[i].range_m,
                                          (float)sight[i].bearing_rad};
-        if (!check(pfl_update(pf->filter, (uint16_t)i, t_us, &z), "pfl_update", k, failure)) {
+        if (!check(pfl_update(pf->filter, (uint16_t)(first_sensor + i), t_us, &z), "pfl_update", k, failure)) {
             return false;
         }
+    }
+    return true;
+}
+
+/* Lane: a cloud much wider than the measurement would starve. It takes the first one after a gap in parts, each with
+ * its share of the log-likelihood, and comes to life again between them by the kernel step. */
+static bool fuse(standoff_pf_t *pf, unsigned k, const standoff_sight_t *sight, failure_t *failure)
+{
+    const standoff_study_t *s = pf->study;
+    const uint32_t parts = s->motion == MOTION_LANE && !pf->in_sight ? s->parts : 1u;
+
+    for (uint32_t part = 1u; part < parts; part++) {
+        if (!update(pf, k, SENSOR_PART, sight, failure) ||
+            !check(pfl_resample(pf->filter), "pfl_resample", k, failure)) {
+            return false;
+        }
+    }
+    if (!update(pf, k, parts > 1u ? SENSOR_PART : 0u, sight, failure)) {
+        return false;
     }
     const double ess = (double)pfl_effective_sample_size(pf->filter);
     return ess > s->ess_ratio * (double)s->particles || check(pfl_resample(pf->filter), "pfl_resample", k, failure);
 }
 
+static bool answer(standoff_pf_t *pf, unsigned k, standoff_belief_t *belief, failure_t *failure)
+{
+    const bool lane = pf->study->motion == MOTION_LANE;
+    float mean[TARGET_STATES];
+    float cov[TARGET_STATES * TARGET_STATES];
+    float reach_m;
+    const uint16_t second = lane ? PFL_LANE_OFFSET : TARGET_Y;
+
+    if (!check(pfl_estimate(pf->filter, mean, lane ? cov : NULL), "pfl_estimate", k, failure) ||
+        !check(pfl_farthest(pf->filter, 0u, second, mean[0], mean[second], &reach_m), "pfl_farthest", k, failure)) {
+        return false;
+    }
+    for (int d = 0; !lane && d < TARGET_STATES; d++) {
+        belief->target[d] = (double)mean[d];
+    }
+    if (lane) {
+        standoff_lane_belief(mean, cov, belief);
+    }
+    if (!lane || pf->study->farthest) {
+        belief->reach_m = (double)reach_m;
+    }
+    return true;
+}
+
 static bool count_off_road(standoff_pf_t *pf, unsigned k, failure_t *failure)
 {
+    const bool lane = pf->study->motion == MOTION_LANE;
     pfl_view_t view;
 
     if (!check(pfl_particles(pf->filter, &view, pf->log_weights), "pfl_particles", k, failure)) {
         return false;
     }
-    const float *x = view.x + TARGET_X * view.stride;
-    const float *y = view.x + TARGET_Y * view.stride;
     for (uint32_t i = 0u; i < view.n; i++) {
-        const double r = hypot((double)x[i], (double)y[i]);
+        const double x = (double)view.x[TARGET_X * view.stride + i];
+        const double y = (double)view.x[TARGET_Y * view.stride + i];
+        const double r = lane ? ROAD_CENTER_LINE_M + (double)view.x[PFL_LANE_OFFSET * view.stride + i] : hypot(x, y);
         const bool off = r < ROAD_INNER_M - ON_ROAD_M || r > ROAD_OUTER_M + ON_ROAD_M;
         pf->off_road += off && isfinite(pf->log_weights[i]) ? 1u : 0u;
     }
@@ -280,26 +345,19 @@ static bool count_off_road(standoff_pf_t *pf, unsigned k, failure_t *failure)
 }
 
 bool standoff_pf_step(standoff_pf_t *pf, unsigned k, const standoff_sight_t *sight, standoff_belief_t *belief,
-                      uint32_t *cycles_ns, failure_t *failure)
+                      uint32_t *cycles_ns, cycle_t *cycle, failure_t *failure)
 {
     const uint64_t t_us = (uint64_t)k * STANDOFF_PERIOD_US;
     pfl_health_t health;
-    float mean[TARGET_STATES];
-    float reach_m;
 
     if (!check(pfl_predict(pf->filter, t_us, NULL), "pfl_predict", k, failure) || !weigh_road(pf, k, t_us, failure) ||
-        (sight != NULL && !fuse(pf, k, t_us, sight, failure)) ||
-        !check(pfl_estimate(pf->filter, mean, NULL), "pfl_estimate", k, failure) ||
-        !check(pfl_farthest(pf->filter, TARGET_X, TARGET_Y, mean[TARGET_X], mean[TARGET_Y], &reach_m), "pfl_farthest",
-               k, failure) ||
+        (sight != NULL && !fuse(pf, k, sight, failure)) || !answer(pf, k, belief, failure) ||
         !check(pfl_health(pf->filter, &health), "pfl_health", k, failure) || !count_off_road(pf, k, failure)) {
         return false;
     }
-    for (int d = 0; d < TARGET_STATES; d++) {
-        belief->target[d] = (double)mean[d];
-    }
-    belief->reach_m = (double)reach_m;
     *cycles_ns = (uint32_t)((double)health.cycles_last * 1e9 / (double)pfl_port_cycles_hz());
+    *cycle = cycle_of(&health);
+    pf->in_sight = sight != NULL;
     pf->steps = k;
     return true;
 }

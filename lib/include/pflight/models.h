@@ -76,12 +76,11 @@ typedef struct {
 void pfl_odometry_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p);
 
 /* ---- A target on a ring road ------------------------------------------------------------------------------------ */
-/* States as those of constant velocity: x, y [m], vx, vy [m/s]; Q = 2; u: not used. Both models turn the velocity with
- * the road and never leave it, so they need no constraint. Accelerations as there: sigma w / sqrt(dt), held over the
- * step. With r the distance from the center, th the angle there, vr and vt the speeds outwards and along: */
-
-/* r += dt vr + dt^2/2 a0, vr += dt a0, th += (dt vt + dt^2/2 a1) / r, vt += dt a1; r clipped to the road, where vr loses
- * what points off it. */
+/* States as those of constant velocity: x, y [m], vx, vy [m/s]; Q = 2; u: not used. The velocity turns with the road, and
+ * no particle leaves it. Accelerations a = sigma w / sqrt(dt), held over the step. With r the distance from the center,
+ * th the angle there, vr and vt the speeds outwards and along:
+ *     r += dt vr + dt^2/2 a0, vr += dt a0, th += (dt vt + dt^2/2 a1) / r, vt += dt a1
+ * and r is clipped to the road, where vr loses what points off it. */
 typedef struct {
     float center_x_m, center_y_m;
     float inner_m, outer_m; /* 0 < inner_m < outer_m */
@@ -91,16 +90,19 @@ typedef struct {
 
 void pfl_road_target_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p);
 
-/* Follows the center line: V = vt radius_m / r is the speed on it, V += dt a1, th += dt (V_old + V) / (2 radius_m). The
- * offset r - radius_m is coloured noise (first order, stationary) and clipped to the road; no speed is kept for it. */
+/* ---- A target on a road of any shape, in the road's own coordinates ---------------------------------------------- */
+/* States: arc length along the center line [m], speed [m/s], offset across [m]. Q = 2; u: not used. The speed is driven
+ * by white acceleration, held over the step; the offset is coloured noise of first order, stationary, and clipped to the
+ * road:    V += dt a, arc += dt (V_old + V) / 2, offset <- k offset + sqrt(1 - k^2) sigma_offset w1, k = exp(-dt/time)
+ * A sensor has to know the road's shape. */
+enum { PFL_LANE_ARC = 0, PFL_LANE_SPEED = 1, PFL_LANE_OFFSET = 2, PFL_LANE_STATES = 3 };
+
 typedef struct {
-    float center_x_m, center_y_m;
-    float radius_m;                     /* of the center line */
-    float half_width_m;                 /* < radius_m */
-    float sigma_along;                  /* of a1 [m/s^2/sqrt(Hz)] */
-    float sigma_offset_m;               /* of the offset */
-    float offset_time_s;                /* its correlation time, > 0 */
+    float sigma_along;                  /* of a [m/s^2/sqrt(Hz)] */
     float speed_min_mps, speed_max_mps; /* V is clipped to them; infinities for none */
+    float half_width_m;
+    float sigma_offset_m;
+    float offset_time_s; /* correlation time of the offset, > 0 */
 } pfl_lane_target_t;
 
 void pfl_lane_target_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p);

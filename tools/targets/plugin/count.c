@@ -2,11 +2,15 @@
  * timer on the target and without a change to the image. Exact and repeatable. These are instructions, NOT cycles.
  *
  * count.so,out=FILE,from=ADDRESS,call=NAME@ADDRESS,...,part=NAME@ADDRESS,...   (hexadecimal addresses)
+ *          [,blocks=FILE]
  *
  * Counting starts when the program first comes to `from`. A call begins at the first instruction of its function and ends where the function returns to; parts are functions
  * inside of calls whose shares are told too. One line a call: its name, instructions, those of each part, then by class
  * those of the whole call. For Arm Thumb an ESTIMATE of Cortex-M4 cycles follows, from the instruction timings of the
  * Cortex-M4 technical reference manual (zero wait states, 1 to 3 cycles to refill the pipeline): not a measurement.
+ *
+ * blocks: at the end, "ADDRESS INSTRUCTIONS" for each block that ran inside of calls, all its runs together: with a list
+ * of symbols, a profile by function.
  *
  * Everything is counted by blocks of instructions without a branch, which QEMU translates as a whole. The plugin
  * headers of QEMU are not installed by Debian: what is used of them is declared here. */
@@ -33,7 +37,8 @@ typedef void (*exec_fn)(unsigned cpu, void *user);
 typedef void (*trans_fn)(qemu_plugin_id_t id, struct qemu_plugin_tb *tb);
 extern void qemu_plugin_register_vcpu_tb_trans_cb(qemu_plugin_id_t id, trans_fn trans);
 extern void qemu_plugin_register_vcpu_tb_exec_cb(struct qemu_plugin_tb *tb, exec_fn exec, int flags, void *user);
-extern void qemu_plugin_register_atexit_cb(qemu_plugin_id_t id, void (*end)(qemu_plugin_id_t id, void *user), void *user);
+extern void qemu_plugin_register_atexit_cb(qemu_plugin_id_t id, void (*end)(qemu_plugin_id_t id, void *user),
+                                           void *user);
 extern size_t qemu_plugin_tb_n_insns(const struct qemu_plugin_tb *tb);
 extern struct qemu_plugin_insn *qemu_plugin_tb_get_insn(const struct qemu_plugin_tb *tb, size_t index);
 extern uint64_t qemu_plugin_insn_vaddr(const struct qemu_plugin_insn *insn);
@@ -112,8 +117,10 @@ typedef struct {
     bool is_call;
 } mark_t;
 
-typedef struct {
+typedef struct block {
+    struct block *next;
     uint64_t start, end;
+    uint64_t in_calls; /* instructions, of all its runs inside of calls */
     uint32_t count;
     uint32_t of_class[CLASSES];
     uint32_t more_words;
@@ -130,8 +137,9 @@ static mark_t marks[MARKS_MAX];
 static int marks_count;
 static uint64_t from;
 static bool started;
-static FILE *out;
+static FILE *out, *blocks;
 static bool thumb;
+static block_t *all_blocks;
 static const block_t *before; /* the block that ran last */
 static int call = -1, part = -1;
 static uint64_t call_return, part_return;
@@ -140,11 +148,11 @@ static uint64_t of_part[MARKS_MAX];
 
 static void print_estimate(void)
 {
-    const uint64_t fixed = sums.count + sums.more_words +
-                           13u * (sums.of_class[FLOAT_DIVIDE] + sums.of_class[FLOAT_ROOT]);
+    const uint64_t fixed =
+        sums.count + sums.more_words + 13u * (sums.of_class[FLOAT_DIVIDE] + sums.of_class[FLOAT_ROOT]);
     const uint64_t low = fixed + sums.taken + sums.of_class[DIVIDE];
-    const uint64_t high = fixed + 3u * sums.taken + 11u * sums.of_class[DIVIDE] + sums.of_class[LOAD] +
-                          sums.of_class[FLOAT_ARITHMETIC];
+    const uint64_t high =
+        fixed + 3u * sums.taken + 11u * sums.of_class[DIVIDE] + sums.of_class[LOAD] + sums.of_class[FLOAT_ARITHMETIC];
 
     (void)fprintf(out, " estimated_m4_cycles=%llu..%llu", (unsigned long long)low, (unsigned long long)high);
 }
@@ -187,7 +195,7 @@ static void enter(const block_t *b)
 
 static void on_block(unsigned cpu, void *user)
 {
-    const block_t *b = user;
+    block_t *b = user;
 
     (void)cpu;
     if (part >= 0 && b->start == part_return) {
@@ -204,6 +212,7 @@ static void on_block(unsigned cpu, void *user)
     enter(b);
     if (call >= 0) {
         sums.count += b->count;
+        b->in_calls += b->count;
         sums.more_words += b->more_words;
         for (int k = 0; k < CLASSES; k++) {
             sums.of_class[k] += b->of_class[k];
@@ -225,6 +234,8 @@ static void on_translate(qemu_plugin_id_t id, struct qemu_plugin_tb *tb)
     }
     b->count = (uint32_t)qemu_plugin_tb_n_insns(tb);
     b->mark = -1;
+    b->next = all_blocks;
+    all_blocks = b;
     for (uint32_t k = 0; k < b->count; k++) {
         const struct qemu_plugin_insn *insn = qemu_plugin_tb_get_insn(tb, k);
         b->end = qemu_plugin_insn_vaddr(insn) + qemu_plugin_insn_size(insn);
@@ -247,6 +258,14 @@ static void on_end(qemu_plugin_id_t id, void *user)
 {
     (void)id;
     (void)user;
+    for (const block_t *b = all_blocks; blocks != NULL && b != NULL; b = b->next) {
+        if (b->in_calls > 0u) {
+            (void)fprintf(blocks, "%llx %llu\n", (unsigned long long)b->start, (unsigned long long)b->in_calls);
+        }
+    }
+    if (blocks != NULL) {
+        (void)fclose(blocks);
+    }
     (void)fclose(out);
 }
 
@@ -272,6 +291,8 @@ int qemu_plugin_install(qemu_plugin_id_t id, const qemu_info_t *info, int argc, 
     for (int k = 0; k < argc; k++) {
         if (starts(argv[k], "out=")) {
             out = fopen(argv[k] + 4, "w");
+        } else if (starts(argv[k], "blocks=")) {
+            blocks = fopen(argv[k] + 7, "w");
         } else if (starts(argv[k], "from=")) {
             from = strtoull(argv[k] + 5, NULL, 16);
         } else if (!(starts(argv[k], "call=") && add_mark(argv[k] + 5, true)) &&

@@ -89,8 +89,19 @@ static void put_route(const unsigned char *at)
     }
 }
 
+/* A member added behind the last one that types.c knows would be left out silently. */
+static void check_type(const type_t *type)
+{
+    const field_t *last = &type->field[type->fields - 1u];
+    static const size_t width[] = {4u, 2u, sizeof(bool), 4u, sizeof(void *)};
+    if (last->offset + last->count * width[last->kind] + sizeof(void *) <= type->size) {
+        stop("a structure has members that types.c does not name");
+    }
+}
+
 static void put_type(const type_t *type, const void *structure)
 {
+    check_type(type);
     for (uint32_t k = 0u; k < type->fields; k++) {
         const field_t *field = &type->field[k];
         const unsigned char *at = (const unsigned char *)structure + field->offset;
@@ -402,7 +413,8 @@ WRAP(pfl_status_t, pfl_resample, (pfl_t * f))
     return answer_status(__real_pfl_resample(f));
 }
 
-WRAP(pfl_status_t, pfl_farthest, (const pfl_t *f, uint16_t x_state, uint16_t y_state, float x, float y, float *distance))
+WRAP(pfl_status_t, pfl_farthest,
+     (const pfl_t *f, uint16_t x_state, uint16_t y_state, float x, float y, float *distance))
 {
     put((uint32_t)TAPE_FARTHEST);
     put(f == filter ? 0u : 1u);

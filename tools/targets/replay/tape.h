@@ -27,15 +27,15 @@ enum {
 
 typedef enum {
     TAPE_END = 0,
-    TAPE_INIT,      /* configuration; the particles of the prior follow in batches; -> status */
-    TAPE_PREDICT,   /* t_us, u -> status */
-    TAPE_UPDATE,    /* sensor, t_us, z -> status */
-    TAPE_ESTIMATE,  /* 1 with covariance -> status, mean, covariance */
-    TAPE_RESAMPLE,  /* -> status */
-    TAPE_FARTHEST,  /* filter (1: the forecast's), x state, y state, x, y -> status, distance */
-    TAPE_ESS,       /* -> effective sample size */
-    TAPE_FORECAST,  /* 1 with covariance, step_us, steps, and for each step as asked for u -> status, means, covs */
-    TAPE_STANDOFF,  /* guidance, each: its arguments -> status, outputs; see calls.c */
+    TAPE_INIT,     /* configuration; the particles of the prior follow in batches; -> status */
+    TAPE_PREDICT,  /* t_us, u -> status */
+    TAPE_UPDATE,   /* sensor, t_us, z -> status */
+    TAPE_ESTIMATE, /* 1 with covariance -> status, mean, covariance */
+    TAPE_RESAMPLE, /* -> status */
+    TAPE_FARTHEST, /* filter (1: the forecast's), x state, y state, x, y -> status, distance */
+    TAPE_ESS,      /* -> effective sample size */
+    TAPE_FORECAST, /* 1 with covariance, step_us, steps, and for each step as asked for u -> status, means, covs */
+    TAPE_STANDOFF, /* guidance, each: its arguments -> status, outputs; see calls.c */
     TAPE_LVFG,
     TAPE_NMPC_SOLVE,
     TAPE_OPS

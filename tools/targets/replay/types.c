@@ -4,25 +4,37 @@
 
 #define COUNT(array) (sizeof(array) / sizeof((array)[0]))
 #define MEMBER(type, member, kind, width)                                                                              \
-    {(uint16_t)offsetof(type, member), (uint8_t)(kind), (uint8_t)(sizeof(((type *)0)->member) / (width))}
+    {                                                                                                                  \
+        (uint16_t) offsetof(type, member), (uint8_t)(kind), (uint8_t)(sizeof(((type *)0)->member) / (width))           \
+    }
 #define WORD(type, member) MEMBER(type, member, FIELD_WORD, 4u)
 #define HALF(type, member) MEMBER(type, member, FIELD_HALF, 2u)
 #define FLAG(type, member) MEMBER(type, member, FIELD_BOOL, sizeof(bool))
 #define INV_SIGMA(type, member) MEMBER(type, member, FIELD_INV_SIGMA, 4u)
 #define WORDS_FROM(type, member, last)                                                                                 \
-    {(uint16_t)offsetof(type, member), (uint8_t)FIELD_WORD,                                                            \
-     (uint8_t)((offsetof(type, last) - offsetof(type, member)) / 4u + 1u)}
-#define TYPE(fields, type) {fields, (uint16_t)COUNT(fields), (uint16_t)sizeof(type)}
+    {                                                                                                                  \
+        (uint16_t) offsetof(type, member), (uint8_t)FIELD_WORD,                                                        \
+            (uint8_t)((offsetof(type, last) - offsetof(type, member)) / 4u + 1u)                                       \
+    }
+/* A structure of 32-bit members only. */
+#define ALL_WORDS(type)                                                                                                \
+    {                                                                                                                  \
+        0u, (uint8_t)FIELD_WORD, (uint8_t)(sizeof(type) / 4u)                                                          \
+    }
+#define TYPE(fields, type)                                                                                             \
+    {                                                                                                                  \
+        fields, (uint16_t)COUNT(fields), (uint16_t)sizeof(type)                                                        \
+    }
 
 /* ---- Models -------------------------------------------------------------------------------------------------------- */
 
-static const field_t land_vehicle_fields[] = {WORDS_FROM(pfl_land_vehicle_t, power_w, sigma_heading_rad)};
-static const field_t land_input_fields[] = {WORDS_FROM(pfl_land_input_t, throttle, steer_rad)};
-static const field_t constant_velocity_fields[] = {WORDS_FROM(pfl_constant_velocity_t, sigma_accel, sigma_position)};
-static const field_t odometry_fields[] = {WORDS_FROM(pfl_odometry_t, speed_scale, sigma_position)};
-static const field_t odometry_input_fields[] = {WORDS_FROM(pfl_odometry_input_t, speed_mps, turn_radps)};
-static const field_t road_target_fields[] = {WORDS_FROM(pfl_road_target_t, center_x_m, sigma_along)};
-static const field_t lane_target_fields[] = {WORDS_FROM(pfl_lane_target_t, center_x_m, speed_max_mps)};
+static const field_t land_vehicle_fields[] = {ALL_WORDS(pfl_land_vehicle_t)};
+static const field_t land_input_fields[] = {ALL_WORDS(pfl_land_input_t)};
+static const field_t constant_velocity_fields[] = {ALL_WORDS(pfl_constant_velocity_t)};
+static const field_t odometry_fields[] = {ALL_WORDS(pfl_odometry_t)};
+static const field_t odometry_input_fields[] = {ALL_WORDS(pfl_odometry_input_t)};
+static const field_t road_target_fields[] = {ALL_WORDS(pfl_road_target_t)};
+static const field_t lane_target_fields[] = {ALL_WORDS(pfl_lane_target_t)};
 static const field_t autopilot_fields[] = {
     WORDS_FROM(pfl_autopilot_t, alpha_speed, wind_walk),
     HALF(pfl_autopilot_t, substeps),
@@ -34,7 +46,7 @@ static const field_t autopilot_input_fields[] = {
     {(uint16_t)offsetof(pfl_autopilot_input_t, route), (uint8_t)FIELD_ROUTE, 1u},
 };
 static const field_t coast_fields[] = {HALF(pfl_coast_t, axes), HALF(pfl_coast_t, remember)};
-static const field_t turn_fields[] = {WORDS_FROM(pfl_turn_t, sigma_speed, remember)};
+static const field_t turn_fields[] = {ALL_WORDS(pfl_turn_t)};
 
 static const type_t land_vehicle = TYPE(land_vehicle_fields, pfl_land_vehicle_t);
 static const type_t land_input = TYPE(land_input_fields, pfl_land_input_t);
@@ -75,19 +87,19 @@ static const field_t range_fields[] = {
     INV_SIGMA(pfl_range_t, inv_sigma),
     WORD(pfl_range_t, dof),
 };
-static const field_t range_z_fields[] = {WORDS_FROM(pfl_range_z_t, anchor_x_m, scale)};
+static const field_t range_z_fields[] = {ALL_WORDS(pfl_range_z_t)};
 static const field_t range_bearing_fields[] = {
     HALF(pfl_range_bearing_t, x_state),
     HALF(pfl_range_bearing_t, y_state),
     INV_SIGMA(pfl_range_bearing_t, inv_sigma_range),
     INV_SIGMA(pfl_range_bearing_t, inv_sigma_bearing),
 };
-static const field_t range_bearing_z_fields[] = {WORDS_FROM(pfl_range_bearing_z_t, from_x_m, bearing_rad)};
+static const field_t range_bearing_z_fields[] = {ALL_WORDS(pfl_range_bearing_z_t)};
 static const field_t coloured_fields[] = {
     HALF(pfl_coloured_t, count), HALF(pfl_coloured_t, state),          HALF(pfl_coloured_t, before),
     WORD(pfl_coloured_t, decay), INV_SIGMA(pfl_coloured_t, inv_sigma),
 };
-static const field_t coloured_z_fields[] = {WORD(pfl_coloured_z_t, now), WORD(pfl_coloured_z_t, before)};
+static const field_t coloured_z_fields[] = {ALL_WORDS(pfl_coloured_z_t)};
 static const field_t velocity_fields[] = {
     HALF(pfl_velocity_t, speed_state),
     HALF(pfl_velocity_t, heading_state),
@@ -125,19 +137,19 @@ static const field_t ring_fields[] = {
     HALF(pfl_ring_t, vy_state),
     WORDS_FROM(pfl_ring_t, center_x_m, outer_m),
 };
-static const field_t uav_fields[] = {WORDS_FROM(pfl_uav_t, x_m, turn_radps)};
-static const field_t target_fields[] = {WORDS_FROM(pfl_target_t, x_m, vy_mps)};
-static const field_t standoff_fields[] = {WORDS_FROM(pfl_standoff_t, reach_gain, rate_max_mps)};
-static const field_t standoff_state_fields[] = {WORDS_FROM(pfl_standoff_state_t, distance_m, steps)};
+static const field_t uav_fields[] = {ALL_WORDS(pfl_uav_t)};
+static const field_t target_fields[] = {ALL_WORDS(pfl_target_t)};
+static const field_t standoff_fields[] = {ALL_WORDS(pfl_standoff_t)};
+static const field_t standoff_state_fields[] = {ALL_WORDS(pfl_standoff_state_t)};
 static const field_t lvfg_fields[] = {
     WORDS_FROM(pfl_lvfg_t, limits, phase_gain),
     FLAG(pfl_lvfg_t, target_motion),
 };
-static const field_t command_fields[] = {WORDS_FROM(pfl_planar_uav_input_t, speed_mps, turn_radps)};
-static const field_t nmpc_fields[] = {WORDS_FROM(pfl_nmpc_t, limits, phase_form)};
-static const field_t nmpc_plan_fields[] = {WORD(pfl_nmpc_plan_t, speed_mps), WORD(pfl_nmpc_plan_t, turn_radps)};
-static const field_t nmpc_path_fields[] = {WORD(pfl_nmpc_path_t, x_m), WORD(pfl_nmpc_path_t, y_m)};
-static const field_t nmpc_report_fields[] = {WORDS_FROM(pfl_nmpc_report_t, cost, evaluations)};
+static const field_t command_fields[] = {ALL_WORDS(pfl_planar_uav_input_t)};
+static const field_t nmpc_fields[] = {ALL_WORDS(pfl_nmpc_t)};
+static const field_t nmpc_plan_fields[] = {ALL_WORDS(pfl_nmpc_plan_t)};
+static const field_t nmpc_path_fields[] = {ALL_WORDS(pfl_nmpc_path_t)};
+static const field_t nmpc_report_fields[] = {ALL_WORDS(pfl_nmpc_report_t)};
 
 const tape_project_t tape_projects[] = {{NULL}, {pfl_ring_slide}, {pfl_ring_bounce}, {pfl_ring_clamp}};
 const uint32_t tape_projects_count = COUNT(tape_projects);

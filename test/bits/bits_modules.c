@@ -1,0 +1,210 @@
+/* Hashes of the optional modules: each model moves a cloud some steps, each sensor weighs it, constraints project it, and
+ * guidance answers for states all over. Inputs come from integers only. */
+#include "hashing.h"
+
+#include "pflight/pflight.h"
+
+#include <stddef.h>
+
+#define N 64u
+#define D 9u
+#define Q 4u
+
+static float cloud[D * N];
+static float noise[Q * PFL_BATCH];
+static float ll[N];
+static pfl_rng_t rng;
+
+static const pfl_waypoint_t places[] = {{40.0f, 0.0f}, {40.0f, 40.0f}, {0.0f, 40.0f}, {0.0f, 0.0f}};
+static const pfl_route_t route = {places, 4u, true, PFL_SWITCH_HALF_PLANE, 9.0f, 1.0f, 0.05f};
+
+static void scatter(float around, float width)
+{
+    for (uint32_t k = 0u; k < D * N; k++) {
+        cloud[k] = around + between(-width, width);
+    }
+}
+
+static void mix_cloud(void)
+{
+    for (uint32_t k = 0u; k < D * N; k++) {
+        mix(cloud[k]);
+    }
+}
+
+static pfl_batch_t batch(uint32_t n)
+{
+    const pfl_batch_t b = {cloud, N, noise, 0u, n};
+    return b;
+}
+
+static void of_model(const char *part, pfl_predict_fn predict, void *user, const void *u, float around, float width)
+{
+    begin(71u);
+    pfl_rng_seed(&rng, 5u);
+    scatter(around, width);
+    for (uint32_t k = 0u; k < 20u; k++) {
+        const pfl_batch_t b = batch((k & 1u) != 0u ? 64u : 37u);
+        pfl_rng_normals(&rng, noise, Q * PFL_BATCH / 16u);
+        predict(user, u, (k % 5u == 0u) ? 0.5f : 0.02f, &b);
+        mix_cloud();
+    }
+    end(part);
+}
+
+static void of_models(void)
+{
+    static pfl_autopilot_t pilot = {0.5f, 1.0f, 0.36f, 1.2f, 15.0f, 25.0f, 0.4f, 1.0f, -0.5f, 0.3f, 0.1f, 10u, 6u, 8u};
+    static const pfl_autopilot_input_t wanted = {20.0f, 100.0f, 0.4f, 0.1f, &route};
+    static pfl_planar_uav_t uav = {0.33f, 10u, 0.2f, 0.05f};
+    static pfl_planar_uav_t stepped = {0.5f, 0u, 0.2f, 0.05f};
+    static const pfl_planar_uav_input_t command = {15.0f, 0.4f};
+    static pfl_road_target_t road = {.inner_m = 96.0f, .outer_m = 100.0f, .sigma_across = 0.3f, .sigma_along = 0.5f};
+    static pfl_lane_target_t lane = {0.7f, 1.5f, 6.5f, 2.0f, 0.7f, 5.0f};
+    static pfl_coast_t coast = {3u, 1u};
+    static pfl_turn_t turn = {0.15f, 0.05f, 0.1f, 0.3f, 1u};
+    of_model("model-autopilot", pfl_autopilot_predict, &pilot, &wanted, 1.0f, 20.0f);
+    pilot.waypoint_state = 0u;
+    of_model("model-autopilot-heading", pfl_autopilot_predict, &pilot, &wanted, 1.0f, 3.0f);
+    of_model("model-planar-uav", pfl_planar_uav_predict, &uav, &command, 2.0f, 5.0f);
+    of_model("model-planar-uav-euler", pfl_planar_uav_predict, &stepped, &command, 2.0f, 5.0f);
+    of_model("model-road-target", pfl_road_target_predict, &road, NULL, 60.0f, 60.0f);
+    of_model("model-lane-target", pfl_lane_target_predict, &lane, NULL, 2.0f, 3.0f);
+    of_model("model-coast", pfl_coast_predict, &coast, NULL, 0.0f, 9.0f);
+    of_model("model-turn", pfl_turn_predict, &turn, NULL, 0.0f, 3.0f);
+}
+
+static void of_sensor(const char *part, pfl_loglik_fn loglik, void *user, const void *z)
+{
+    begin(72u);
+    for (uint32_t k = 0u; k < 20u; k++) {
+        const pfl_view_t view = {cloud, N, 0u, (k & 1u) != 0u ? 64u : 29u};
+        scatter(0.5f, 3.0f);
+        loglik(user, z, &view, ll);
+        for (uint32_t i = 0u; i < view.n; i++) {
+            mix(ll[i]);
+        }
+    }
+    end(part);
+}
+
+static void of_sensors(void)
+{
+    static pfl_coloured_t coloured = {2u, {0u, 1u}, {5u, 6u}, 0.5f, {0.7f, 0.6f}};
+    static const pfl_coloured_z_t pair = {.now = {1.0f, -0.5f}, .before = {0.8f, 0.1f}};
+    static pfl_velocity_t velocity = {2u, 3u, 4.0f};
+    static const float seen[3] = {1.2f, -0.4f, 0.3f};
+    static pfl_position_t distance = {3u, {0u, 1u, 2u}, {1.4f, 1.4f, 1.4f}};
+    of_sensor("sensor-coloured", pfl_coloured_loglik, &coloured, &pair);
+    of_sensor("sensor-velocity", pfl_velocity_loglik, &velocity, seen);
+    of_sensor("sensor-position-distance", pfl_position_distance_loglik, &distance, seen);
+}
+
+static void of_ring(void)
+{
+    static pfl_ring_t ring = {0u, 1u, 2u, 3u, 1.0f, -2.0f, 96.0f, 100.0f};
+    static const pfl_project_fn projections[] = {pfl_ring_slide, pfl_ring_bounce, pfl_ring_clamp};
+    begin(73u);
+    for (uint32_t k = 0u; k < 30u; k++) {
+        uint32_t inside[N];
+        const pfl_batch_t b = batch(N);
+        const pfl_view_t view = {cloud, N, 0u, N};
+        scatter(0.0f, 120.0f);
+        projections[k % 3u](&ring, &b);
+        pfl_ring_inside(&ring, &view, inside);
+        mix_cloud();
+        for (uint32_t i = 0u; i < N; i++) {
+            mix((float)inside[i]);
+        }
+    }
+    end("constraint-ring");
+}
+
+static pfl_uav_t any_uav(void)
+{
+    pfl_uav_t uav;
+    uav.x_m = between(-150.0f, 150.0f);
+    uav.y_m = between(-150.0f, 150.0f);
+    uav.heading_rad = between(-9.0f, 9.0f);
+    uav.speed_mps = between(8.0f, 22.0f);
+    uav.turn_radps = between(-0.7f, 0.7f);
+    return uav;
+}
+
+static void of_field(void)
+{
+    const pfl_uav_limits_t limits = {15.0f, 7.0f, 0.7f};
+    begin(74u);
+    for (uint32_t k = 0u; k < 2000u; k++) {
+        const pfl_lvfg_t lvfg = {limits, 0.5f, 1.2f, (k & 1u) != 0u};
+        const pfl_uav_t uav[2] = {any_uav(), any_uav()};
+        const pfl_target_t target = {between(-9.0f, 9.0f), between(-9.0f, 9.0f), between(-5.0f, 5.0f), 1.0f};
+        const pfl_standoff_state_t state = {between(30.0f, 100.0f), between(-5.0f, 5.0f), 50.0f, k};
+        pfl_planar_uav_input_t command[2] = {{0.0f, 0.0f}, {0.0f, 0.0f}};
+        mix((float)pfl_lvfg_command(&lvfg, uav, 1u + (k % 2u), &target, &state, command));
+        mix(command[0].speed_mps);
+        mix(command[0].turn_radps);
+        mix(command[1].speed_mps);
+        mix(command[1].turn_radps);
+    }
+    end("guidance-lvfg");
+}
+
+static void of_predictive_control(void)
+{
+    pfl_nmpc_t nmpc = {
+        {15.0f, 7.0f, 0.7f}, 0.5f, 0.77687f, 0.5f, 83.3f, 16.7f, 500.0f, 100.0f, 100.0f, 50.0f, 1000.0f, 30.0f,
+        PFL_PHASE_PRODUCT};
+    begin(75u);
+    for (uint32_t k = 0u; k < 200u; k++) {
+        const pfl_uav_t uav = any_uav();
+        const pfl_uav_t other = any_uav();
+        const pfl_target_t target = {between(-9.0f, 9.0f), between(-9.0f, 9.0f), between(-5.0f, 5.0f), 1.0f};
+        pfl_nmpc_plan_t plan;
+        pfl_nmpc_path_t path;
+        pfl_nmpc_path_t pair;
+        pfl_nmpc_report_t report = {0.0f, 0u};
+        for (uint32_t j = 0u; j < PFL_NMPC_STEPS; j++) {
+            plan.speed_mps[j] = 15.0f;
+            plan.turn_radps[j] = 0.5f;
+        }
+        nmpc.phase_form = (k & 1u) != 0u ? PFL_PHASE_PRODUCT : PFL_PHASE_DIRECTION;
+        mix((float)pfl_nmpc_rollout(&nmpc, &other, &plan, &pair, NULL));
+        mix((float)pfl_nmpc_extrapolate(&nmpc, &target, &path));
+        const pfl_nmpc_problem_t problem = {uav, &path, (k % 3u) != 0u ? &pair : NULL, 45.0f};
+        mix((float)pfl_nmpc_solve(&nmpc, &problem, &plan, &report));
+        mix(report.cost);
+        mix((float)report.evaluations);
+        for (uint32_t j = 0u; j < PFL_NMPC_STEPS; j++) {
+            mix(plan.speed_mps[j]);
+            mix(plan.turn_radps[j]);
+        }
+    }
+    end("guidance-nmpc");
+}
+
+static void of_waypoints(void)
+{
+    uint32_t target = 0u;
+    begin(76u);
+    for (uint32_t k = 0u; k < 2000u; k++) {
+        const float x_m = between(-20.0f, 60.0f);
+        const float y_m = between(-20.0f, 60.0f);
+        target = pfl_route_switch(&route, target, x_m, y_m);
+        mix((float)target);
+        mix(pfl_route_bearing(&route, target, x_m, y_m));
+        mix(pfl_route_course(&route, target, x_m, y_m));
+        mix(pfl_route_cross_track(&route, target, x_m, y_m));
+    }
+    end("waypoints");
+}
+
+void of_modules(void)
+{
+    of_models();
+    of_sensors();
+    of_ring();
+    of_field();
+    of_predictive_control();
+    of_waypoints();
+}
