@@ -7,18 +7,12 @@
 
 #include "pflight/math.h"
 
-#define RADIUS_MIN_M 1.0e-6f /* a particle on the center has no direction: guards the division */
+#define NO_RADIUS 1.0e-12f /* nearer to the center than this there is no direction: any will do */
 
 static inline float clip(float x, float lo, float hi)
 {
     const float low = (x < lo) ? lo : x;
     return (low > hi) ? hi : low;
-}
-
-static inline float radius_of(float dx, float dy)
-{
-    const float r = pfl_sqrt_kernel((dx * dx) + (dy * dy));
-    return (r < RADIUS_MIN_M) ? RADIUS_MIN_M : r;
 }
 
 void pfl_road_target_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p)
@@ -40,9 +34,10 @@ void pfl_road_target_predict(void *user, const void *u, float dt_s, const pfl_ba
         float c;
         const float dx = x[i] - m.center_x_m;
         const float dy = y[i] - m.center_y_m;
-        const float r = radius_of(dx, dy);
-        const float nx = dx / r;
-        const float ny = dy / r;
+        const float r = pfl_sqrt_kernel((dx * dx) + (dy * dy));
+        const bool nowhere = r < NO_RADIUS;
+        const float nx = nowhere ? 1.0f : (dx / r);
+        const float ny = nowhere ? 0.0f : (dy / r);
         const float out = (vx[i] * nx) + (vy[i] * ny);
         const float on = (vy[i] * nx) - (vx[i] * ny);
         const float kick_out = across * w_across[i];

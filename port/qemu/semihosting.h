@@ -26,10 +26,11 @@ static inline int32_t sh_call(uint32_t operation, const void *block)
     register uint32_t a0 __asm__("a0") = operation;
     register const void *a1 __asm__("a1") = block;
     /* The three instructions that mark the trap: uncompressed, and within one page. */
-    __asm__ volatile(".balign 16\n .option push\n .option norvc\n slli x0, x0, 0x1f\n ebreak\n srai x0, x0, 7\n .option pop"
-                     : "+r"(a0)
-                     : "r"(a1)
-                     : "memory");
+    __asm__ volatile(
+        ".balign 16\n .option push\n .option norvc\n slli x0, x0, 0x1f\n ebreak\n srai x0, x0, 7\n .option pop"
+        : "+r"(a0)
+        : "r"(a1)
+        : "memory");
     return (int32_t)a0;
 }
 #else

@@ -175,6 +175,12 @@ class Compare(unittest.TestCase):
         for errors, code in ((2.9, 0), (-2.9, 0), (3.1, 1), (-3.1, 1)):
             self.assertEqual(code, run("compare", a, self.edited(a, shifted(errors))).returncode, errors)
 
+    def test_rounding_is_no_difference(self):
+        a = self.write("a.json", "--filter", "ukf")
+        b = self.write("b.json", "--filter", "ukf", "--seed", "2")
+        self.assertLess(parse(a)["metrics"]["eta_ratio_kf"]["stderr"], 1e-15)
+        self.assertEqual(0, run("compare", a, b).returncode)
+
     def test_a_metric_that_one_side_lacks_differs(self):
         a = self.write("a.json")
         b = self.edited(a, lambda data: data["metrics"].pop("eta") and data.update(hash="0" * 16))
@@ -371,6 +377,23 @@ class Report(unittest.TestCase):
                                       text=True, timeout=60, check=False)
                 self.assertEqual((3, ""), (done.returncode, done.stdout))
                 self.assertRegex(done.stderr, r"\Areport: [^\n]+\n\Z")
+
+
+class Skipped(unittest.TestCase):
+    def test_names_that_need_escaping_reach_every_file(self):
+        with tempfile.TemporaryDirectory() as place:
+            missing = 'no<such>&"folder'
+            done = run("--runs", "2", "--data", missing, "--out", "made", cwd=place)
+            self.assertEqual(("", 0), (done.stderr, done.returncode))
+            made = pathlib.Path(place, "made")
+            skipped = parse(made / "summary.json")["skipped"]
+            self.assertEqual(["uwb-range"], [entry["scenario"] for entry in skipped])
+            self.assertIn(missing, skipped[0]["reason"])
+            suites = xml.etree.ElementTree.parse(made / "junit.xml").getroot()
+            self.assertEqual([skipped[0]["reason"]], [case.get("message") for case in suites.iter("skipped")])
+            page = page_of(made / "report.html")
+            self.assertEqual(([], []), (page.problems, page.open))
+            self.assertIn("uwb-range", page.ids)
 
 
 @unittest.skipUnless(CHROMIUM, "Chromium is not installed")

@@ -162,7 +162,7 @@ static pfl_status_t cut_at(uint32_t k, const pfl_config_t *c, const float *mean,
     leap(k, BUDGET + 1u);
     const pfl_status_t status = pfl_update(f, 0u, 100000u, &measured);
     jump_at = 0u;
-    (void)snprintf(text, sizeof text, "budget spent at read %u", k);
+    (void)snprintf(text, sizeof text, "budget spent at read %lu", (unsigned long)k);
     TEST_ASSERT_EQUAL_UINT32_MESSAGE(1u, health_of(f).overruns, text);
     if (status == PFL_ERR_BUDGET) {
         TEST_ASSERT_TRUE_MESSAGE(ut_same_posterior(before, ut_snapshot(f), bytes), text);

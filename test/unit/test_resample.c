@@ -197,7 +197,8 @@ static void hammer(uint32_t n, uint32_t scheme, uint32_t sets, bool by_hand)
         }
         resample_once(f, by_hand);
         if (!cloud_is_sound(f, n)) {
-            (void)snprintf(text, sizeof text, "N %u, scheme %u, set %u of kind %u", n, scheme, k, kind);
+            (void)snprintf(text, sizeof text, "N %lu, scheme %lu, set %lu of kind %lu", (unsigned long)n,
+                           (unsigned long)scheme, (unsigned long)k, (unsigned long)kind);
             TEST_FAIL_MESSAGE(text);
         }
     }
@@ -242,7 +243,7 @@ void test_index_never_leaves_the_array_for_any_particle_count(void)
 static void shares_of(const pfl_t *f, uint32_t n)
 {
     pfl_view_t view;
-    double top = -INFINITY;
+    double top = (double)-INFINITY;
     double sum = 0.0;
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_particles(f, &view, log_weights));
     for (uint32_t i = 0u; i < n; i++) {
@@ -298,8 +299,9 @@ static void counts_follow(uint32_t scheme, rule_t rule)
             TEST_ASSERT_TRUE(cloud_is_sound(f, n));
             for (uint32_t i = 0u; i < n; i++) {
                 if (!count_fits(rule, n, i)) {
-                    (void)snprintf(text, sizeof text, "N %u, kind %u: particle %u, share %.9g, %u copies", n, k % KINDS,
-                                   i, share[i], offspring[i]);
+                    (void)snprintf(text, sizeof text, "N %lu, kind %lu: particle %lu, share %.9g, %lu copies",
+                                   (unsigned long)n, (unsigned long)(k % KINDS), (unsigned long)i, share[i],
+                                   (unsigned long)offspring[i]);
                     TEST_FAIL_MESSAGE(text);
                 }
             }

@@ -13,6 +13,7 @@ import sys
 USAGE = "usage: tools/run compare A.json B.json (objects of --json, or summary.json of all scenarios)"
 EXIT_AGREE, EXIT_DIFFER, EXIT_USAGE, EXIT_UNREADABLE = 0, 1, 2, 3
 LIMIT = 3.0  # combined standard errors
+ROUNDING = 1e-12  # relative; two exact filters differ by it, and so do their standard errors
 
 
 class Unreadable(Exception):
@@ -95,7 +96,7 @@ def judge(a, b):
     """Delta, its size in combined standard errors (None: there are none), and whether the two agree."""
     delta = b["mean"] - a["mean"]
     error = combined_error(a, b)
-    if delta == 0.0:
+    if abs(delta) <= ROUNDING * max(abs(a["mean"]), abs(b["mean"])):
         return delta, 0.0, True
     if error is None:
         return delta, None, False

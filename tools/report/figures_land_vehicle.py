@@ -78,7 +78,7 @@ def draw_uncertain(results):
     figure, axes = style.new_figure()
     for jitter, color in (("off", style.OTHER), ("on", style.OURS)):
         mean = results.one(SCENARIO, filter="pf", start="uncertain", jitter=jitter).series
-        axes.plot(mean["t_s"], mean["eps_k"], color=color, label=f"particle filter, jitter {jitter}")
+        axes.plot(mean["t_s"], mean["eps_k"], color=color, label=f"PF, jitter {jitter}")
     axes.set(xlabel="time [s]", ylabel="error index of the step", ylim=(0.0, None))
     style.legend(axes)
     return figure

@@ -6,7 +6,7 @@
 
 #include "pflight/pflight.h"
 
-/* Room for the cycle's record of a filter's health. */
+/* What a cycle did, out of the health of the filter after it. */
 cycle_t cycle_of(const pfl_health_t *health);
 
 /* Adds the filter's cloud in the plane of two states, thinned to at most CLOUD_POINTS particles. `set` names the filter

@@ -93,7 +93,7 @@ static void add_means(const standoff_study_t *s, table_t runs, verdict_t *verdic
         {"standoff_m", STANDOFF_DISTANCE, false},
         {"phase_deg", STANDOFF_PHASE, true},
         {"loss", STANDOFF_LOSS, false},
-        {"loss_any", STANDOFF_LOSS_ANY, true},
+        {"loss_any", STANDOFF_LOSS_ANY, false},
         {"effort_speed_m", STANDOFF_EFFORT_SPEED, false},
         {"effort_turn_rad", STANDOFF_EFFORT_TURN, false},
         {"mean_rd_out_m", STANDOFF_WANTED_OUT, false},

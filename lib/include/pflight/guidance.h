@@ -3,8 +3,9 @@
  * scalar floats with the same bits on every CPU. Angles grow from x to y; orbits too.
  *
  *     pfl_standoff_step    how far to stay away, from the reach of the particle cloud (pfl_farthest)
- *     pfl_lvfg_command     commands by a Lyapunov vector field, one step ahead: some 300 instructions
- *     pfl_nmpc_solve       commands by nonlinear model predictive control, PFL_NMPC_STEPS ahead: 200 times that
+ *     pfl_lvfg_command     commands by a Lyapunov vector field, one step ahead: some 400 instructions a UAV
+ *     pfl_nmpc_solve       commands by nonlinear model predictive control, PFL_NMPC_STEPS ahead: some 90 times that,
+ *                          and three times as much again in the worst case
  *
  * All are O(1), re-entrant, and answer PFL_OK; PFL_ERR_ARG for a null pointer, a parameter out of range or an input that
  * is not finite; PFL_ERR_NONFINITE when the result would not be finite. On an error no output is touched. */
