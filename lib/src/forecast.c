@@ -69,6 +69,10 @@ pfl_status_t pfl_forecast(const pfl_t *f, void *arena, size_t arena_bytes, const
             status = pfl_estimate(copy, &mean[k * states], (cov != NULL) ? &cov[k * states * states] : NULL);
             worst = (status < PFL_OK) ? status : worst;
         }
+        if ((worst >= PFL_OK) && (horizon->visit != NULL)) {
+            status = horizon->visit(horizon->visit_user, k, copy);
+            worst = (status < PFL_OK) ? status : worst;
+        }
     }
     if (out != NULL) {
         *out = copy;

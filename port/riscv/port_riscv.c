@@ -5,7 +5,8 @@
  * A CSR that is not there or not allowed traps; nothing here can find out before, so the choice is at compile time.
  *
  * PFL_PORT_CPU_HZ          the core clock in hertz; 0 or undefined = unknown
- * PFL_PORT_READ_CYCLES     an expression that reads the counter in another way: the unit tests put a fake here
+ * PFL_PORT_READ_CYCLES_H   a header that defines PFL_PORT_READ_CYCLES(), to read the counter in another way: the tests
+ *                          put a fake one here
  */
 #include "pflight/port.h"
 

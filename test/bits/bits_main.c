@@ -441,7 +441,7 @@ static void of_forecast(void)
     float push = 0.125f;
     float mean[8u * 4u];
     float cov[8u * 16u];
-    const pfl_horizon_t horizon = {50000u, 8u, steady, &push};
+    const pfl_horizon_t horizon = {50000u, 8u, steady, &push, NULL, NULL};
     run_t run;
     begin(21u);
     for (uint16_t scheme = 0u; scheme < 4u; scheme++) {

@@ -465,7 +465,7 @@ void test_a_forecast_of_a_linear_model_matches_its_closed_form(void)
 {
     float mean[2];
     float cov[4];
-    const pfl_horizon_t h = {500000u, STEPS, NULL, NULL};
+    const pfl_horizon_t h = {500000u, STEPS, NULL, NULL, NULL, NULL};
     const pfl_config_t c = ut_linear_config(4000u);
     pfl_t *f = flown(&c, 10u);
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_estimate(f, mean, cov));
@@ -495,7 +495,7 @@ void test_a_forecast_of_a_fast_vehicle_keeps_its_covariance(void)
 {
     float mean[2];
     float cov[4];
-    const pfl_horizon_t h = {500000u, STEPS, NULL, NULL};
+    const pfl_horizon_t h = {500000u, STEPS, NULL, NULL, NULL, NULL};
     pfl_config_t c = ut_linear_config(500u);
     c.draw = fast_draw;
     c.predict = quiet_predict;
@@ -509,7 +509,7 @@ void test_a_forecast_of_a_fast_vehicle_keeps_its_covariance(void)
 
 void test_a_forecast_leaves_the_filter_alone_and_replays(void)
 {
-    const pfl_horizon_t h = {500000u, STEPS, NULL, NULL};
+    const pfl_horizon_t h = {500000u, STEPS, NULL, NULL, NULL, NULL};
     const pfl_config_t c = ut_linear_config(N);
     pfl_t *f = flown(&c, 10u);
     const unsigned char *before = ut_snapshot(f);
@@ -525,7 +525,7 @@ void test_a_forecast_hands_out_the_fork_at_the_horizon(void)
     float mean[2];
     float value = 0.0f;
     pfl_t *out = NULL;
-    const pfl_horizon_t h = {500000u, 3u, NULL, NULL};
+    const pfl_horizon_t h = {500000u, 3u, NULL, NULL, NULL, NULL};
     const pfl_config_t c = ut_linear_config(N);
     pfl_t *f = flown(&c, 10u);
     TEST_ASSERT_EQUAL_INT(PFL_OK, forecast(f, &c, &h, &out));
@@ -559,7 +559,7 @@ void test_a_forecast_asks_for_the_input_of_every_step(void)
 {
     float unit = 10.0f;
     float mean[2];
-    const pfl_horizon_t h = {250000u, 4u, control, &unit};
+    const pfl_horizon_t h = {250000u, 4u, control, &unit, NULL, NULL};
     pfl_config_t c = ut_linear_config(N);
     c.predict = shift_predict;
     pfl_t *f = ut_filter(&c);
@@ -577,7 +577,7 @@ void test_a_forecast_asks_for_the_input_of_every_step(void)
 
 void test_a_forecast_refuses_what_it_cannot_do(void)
 {
-    pfl_horizon_t h = {500000u, 3u, NULL, NULL};
+    pfl_horizon_t h = {500000u, 3u, NULL, NULL, NULL, NULL};
     pfl_config_t c = ut_linear_config(N);
     const size_t bytes = PFL_ARENA_BYTES(N, 2, 2);
     void *arena = ut_arena(bytes);
@@ -602,4 +602,53 @@ void test_a_forecast_refuses_what_it_cannot_do(void)
     h.step_us = 1000u;
     TEST_ASSERT_EQUAL_INT(PFL_ERR_CONFIG, pfl_forecast(g, arena, bytes, &h, path, spread, NULL));
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_forecast(g, arena, bytes, &h, path, NULL, NULL));
+}
+
+/* ---- A look at every step ------------------------------------------------------------------------------------------- */
+
+typedef struct {
+    uint32_t calls;
+    uint32_t end_at;
+    float median[STEPS];
+    float reach[STEPS];
+} looked_t;
+
+static pfl_status_t look(void *user, uint32_t step, pfl_t *fork)
+{
+    looked_t *looked = (looked_t *)user;
+    TEST_ASSERT_EQUAL_UINT32(looked->calls, step);
+    looked->calls++;
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_quantile(fork, 0u, 0.5f, &looked->median[step]));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_farthest(fork, 0u, 1u, looked->median[step], 0.0f, &looked->reach[step]));
+    return (looked->calls == looked->end_at) ? PFL_ERR_ARG : PFL_OK;
+}
+
+void test_a_visit_sees_the_fork_after_every_step_and_changes_nothing(void)
+{
+    looked_t looked = {0u, 0u, {0.0f}, {0.0f}};
+    float plain[2u * STEPS];
+    pfl_horizon_t h = {500000u, STEPS, NULL, NULL, NULL, NULL};
+    const pfl_config_t c = ut_linear_config(400u);
+    pfl_t *f = ut_filter(&c);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, forecast(f, &c, &h, NULL));
+    memcpy(plain, path, sizeof plain);
+    h.visit = look;
+    h.visit_user = &looked;
+    TEST_ASSERT_EQUAL_INT(PFL_OK, forecast(f, &c, &h, NULL));
+    TEST_ASSERT_EQUAL_UINT32(STEPS, looked.calls);
+    TEST_ASSERT_EQUAL_MEMORY(plain, path, sizeof plain);
+    for (uint32_t k = 0u; k < STEPS; k++) {
+        TEST_ASSERT_FLOAT_WITHIN(0.25f * looked.reach[k], path[2u * k], looked.median[k]);
+        TEST_ASSERT_TRUE(looked.reach[k] > 1.0f);
+    }
+}
+
+void test_a_visit_can_end_the_forecast(void)
+{
+    looked_t looked = {0u, 3u, {0.0f}, {0.0f}};
+    const pfl_horizon_t h = {500000u, STEPS, NULL, NULL, look, &looked};
+    const pfl_config_t c = ut_linear_config(100u);
+    pfl_t *f = ut_filter(&c);
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, forecast(f, &c, &h, NULL));
+    TEST_ASSERT_EQUAL_UINT32(3u, looked.calls);
 }

@@ -256,15 +256,20 @@ standoff_pf_t *standoff_pf_open(const standoff_study_t *s, uint32_t run, const d
 
 /* ---- A step ------------------------------------------------------------------------------------------------------- */
 
-/* fallback=weight: particles off the road lose their weight. When all would, none does, and the next step slides. */
-static bool weigh_road(standoff_pf_t *pf, unsigned k, uint64_t t_us, failure_t *failure)
+/* fallback=weight: particles off the road lose their weight, and those on it take their place: in an outage here, or
+ * else with the measurement. When all would, none does, and the next step slides. */
+static bool weigh_road(standoff_pf_t *pf, unsigned k, bool in_sight, failure_t *failure)
 {
     if (pf->config.constraint == NULL || pf->study->fallback != FALLBACK_WEIGHT) {
         return true;
     }
-    const pfl_status_t status = pfl_update(pf->filter, SENSOR_ROAD, t_us, &pf->road);
+    const pfl_status_t status = pfl_update(pf->filter, SENSOR_ROAD, (uint64_t)k * STANDOFF_PERIOD_US, &pf->road);
     pf->road.rescue = status == PFL_REJECTED;
-    return pf->road.rescue || check(status, "pfl_update", k, failure);
+    if (pf->road.rescue) {
+        return true;
+    }
+    return check(status, "pfl_update", k, failure) &&
+           (in_sight || check(pfl_resample(pf->filter), "pfl_resample", k, failure));
 }
 
 static bool update(standoff_pf_t *pf, unsigned k, unsigned first_sensor, const standoff_sight_t *sight,
@@ -350,9 +355,10 @@ bool standoff_pf_step(standoff_pf_t *pf, unsigned k, const standoff_sight_t *sig
     const uint64_t t_us = (uint64_t)k * STANDOFF_PERIOD_US;
     pfl_health_t health;
 
-    if (!check(pfl_predict(pf->filter, t_us, NULL), "pfl_predict", k, failure) || !weigh_road(pf, k, t_us, failure) ||
-        (sight != NULL && !fuse(pf, k, sight, failure)) || !answer(pf, k, belief, failure) ||
-        !check(pfl_health(pf->filter, &health), "pfl_health", k, failure) || !count_off_road(pf, k, failure)) {
+    if (!check(pfl_predict(pf->filter, t_us, NULL), "pfl_predict", k, failure) ||
+        !weigh_road(pf, k, sight != NULL, failure) || (sight != NULL && !fuse(pf, k, sight, failure)) ||
+        !answer(pf, k, belief, failure) || !check(pfl_health(pf->filter, &health), "pfl_health", k, failure) ||
+        !count_off_road(pf, k, failure)) {
         return false;
     }
     *cycles_ns = (uint32_t)((double)health.cycles_last * 1e9 / (double)pfl_port_cycles_hz());

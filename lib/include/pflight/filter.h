@@ -283,16 +283,22 @@ pfl_status_t pfl_fork(const pfl_t *f, void *arena, size_t arena_bytes, pfl_t **o
 /* Input to the model for forecast step k = 0 .. steps-1, which begins at t_us. */
 typedef const void *(*pfl_control_fn)(void *user, uint32_t step, uint64_t t_us);
 
+/* A look at the fork after forecast step k: quantiles, reach, cloud. Whatever it changes there goes on being predicted.
+ * Answering below PFL_OK ends the forecast with that status. */
+typedef pfl_status_t (*pfl_visit_fn)(void *user, uint32_t step, pfl_t *fork);
+
 typedef struct {
     uint32_t step_us;       /* length of a step, > 0 */
     uint32_t steps;         /* number of steps, >= 1 */
     pfl_control_fn control; /* null: the model gets u = null */
     void *control_user;
+    pfl_visit_fn visit; /* called after each step; null: not */
+    void *visit_user;
 } pfl_horizon_t;
 
 /* Pure prediction to a horizon; `f` is not touched. Forks it into `arena` (as pfl_fork), resamples the copy once, so
  * that its cloud has equal weights, and predicts. mean: steps x D floats; cov: steps x D x D floats or null. *out, if
- * wanted, is the fork at the horizon, for quantiles and the cloud itself. PFL_OK, PFL_QUARANTINED, those of pfl_fork,
+ * wanted, is the fork at the horizon; horizon->visit sees it after every step. PFL_OK, PFL_QUARANTINED, those of pfl_fork,
  * pfl_predict and pfl_estimate. O(steps N (D^2 + Q)). */
 pfl_status_t pfl_forecast(const pfl_t *f, void *arena, size_t arena_bytes, const pfl_horizon_t *horizon, float *mean,
                           float *cov, pfl_t **out);

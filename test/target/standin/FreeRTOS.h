@@ -15,6 +15,6 @@
 typedef uint32_t TickType_t;
 typedef long BaseType_t;
 
-uint32_t standin_counter(void);
+#include "platforms.h"
 
 #endif

@@ -294,7 +294,7 @@ bool play_forecast(play_t *p)
     static float mean[AHEAD_MAX * 9u];
     mark_t mark;
     const bool with_cov = words_next() != 0u;
-    pfl_horizon_t horizon = {0u, 0u, control_off_tape, NULL};
+    pfl_horizon_t horizon = {0u, 0u, control_off_tape, NULL, NULL, NULL};
     horizon.step_us = words_next();
     horizon.steps = words_next();
     const size_t used = PFL_CEIL8(p->arena_bytes);

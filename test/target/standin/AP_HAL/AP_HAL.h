@@ -2,10 +2,13 @@
 #ifndef STANDIN_AP_HAL_H
 #define STANDIN_AP_HAL_H
 
-#include <stdint.h>
+#include "platforms.h"
 
 namespace AP_HAL {
-uint64_t micros64();
+inline uint64_t micros64()
+{
+    return standin_micros64();
 }
+} // namespace AP_HAL
 
 #endif
