@@ -77,4 +77,8 @@ if(CMAKE_C_COMPILER_ID MATCHES "GNU|Clang")
     -fno-math-errno
     $<$<OR:$<CONFIG:Release>,$<CONFIG:RelWithDebInfo>>:-O3>
   )
+  # Small cores: keep the polynomials' coefficients in registers over a loop rather than loading them for every particle.
+  if(CMAKE_C_COMPILER_ID STREQUAL "GNU" AND CMAKE_SYSTEM_PROCESSOR MATCHES "^(arm|cortex|riscv)")
+    list(APPEND PFLIGHT_COMPILE_OPTIONS -fira-loop-pressure -fno-schedule-insns)
+  endif()
 endif()

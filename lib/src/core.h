@@ -128,6 +128,11 @@ void pfl_meter_begin(pfl_t *f);    /* of a filter cycle */
 void pfl_meter_resume(pfl_t *f);   /* at the start of a call */
 void pfl_meter_pause(pfl_t *f);    /* at its end: brings the health up to date */
 uint32_t pfl_meter_read(pfl_t *f); /* cycles used so far */
-bool pfl_meter_spent(pfl_t *f);    /* has the budget run out? counts an overrun once a cycle */
+bool pfl_meter_is_over(pfl_t *f);  /* with a budget: has it run out? counts an overrun once a cycle */
+
+static inline bool pfl_meter_spent(pfl_t *f)
+{
+    return (f->config->budget_cycles != 0u) && pfl_meter_is_over(f);
+}
 
 #endif

@@ -38,10 +38,10 @@ void pfl_meter_pause(pfl_t *f)
     f->cycles_max = (f->meter.used > f->cycles_max) ? f->meter.used : f->cycles_max;
 }
 
-bool pfl_meter_spent(pfl_t *f)
+bool pfl_meter_is_over(pfl_t *f)
 {
     const uint32_t budget = f->config->budget_cycles;
-    if ((budget == 0u) || (f->meter.mask == 0u) || (pfl_meter_read(f) <= budget)) {
+    if ((f->meter.mask == 0u) || (pfl_meter_read(f) <= budget)) {
         return false;
     }
     if (f->overrun_counted == 0u) {

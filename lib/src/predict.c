@@ -108,7 +108,7 @@ static bool first_group_survives(pfl_t *f, const void *u, float dt_s, uint32_t n
     const pfl_batch_t batch = pfl_batch_at(f, 0u, n);
     pfl_make_noise(f, f->config->noises, n);
     f->config->predict(f->config->user, u, dt_s, &batch);
-    const bool survives = pfl_count_nonfinite(f, 0u, n) < n;
+    const bool survives = !batch_is_suspect(f, 0u, n) || (pfl_count_nonfinite(f, 0u, n) < n);
     if (survives && !rehearsal) {
         return true;
     }

@@ -22,7 +22,7 @@ STAGES = ["predict", "update", "normalise", "estimate", "resample", "answers", "
 # Operations of tape.ticks, as in tape.h.
 OPERATIONS = {1: "pfl_init", 2: "pfl_predict", 3: "pfl_update", 4: "pfl_estimate", 5: "pfl_resample", 6: "pfl_farthest",
               8: "pfl_forecast", 9: "pfl_standoff_step", 10: "pfl_lvfg_command", 11: "pfl_nmpc_solve"}
-HASH_START, HASH_PRIME = 0xCBF29CE484222325, 0x100000001B3
+PARTICLE_FILTER = {"gps": "pf"}  # where the scenario's default is another kind of filter
 
 
 class Failure(Exception):
@@ -121,7 +121,8 @@ def record(scenario, options, folder):
     """Flies the scenario on the host with the tape running; returns what the runner says of it."""
     command = [str(recorder()), scenario, "--runs", "1", "--threads", "1", "--seed", str(options.seed), "--json", "-"]
     command += ["--particles", str(options.particles)] if options.particles else []
-    command += ["--filter", options.filter] if options.filter else []
+    wanted = options.filter or PARTICLE_FILTER.get(scenario)
+    command += ["--filter", wanted] if wanted else []
     for setting in options.set:
         command += ["--set", setting]
     return runner(command, folder, PFLIGHT_TAPE="host")
@@ -144,13 +145,6 @@ def write_tape(recorded, path, options):
     if options.sharpen is not None:
         struct.pack_into("<f", data, 12, options.sharpen)
     path.write_bytes(data)
-
-
-def hash_u64(value):
-    result = HASH_START
-    for byte in struct.pack("<Q", value):
-        result = ((result ^ byte) * HASH_PRIME) & 0xFFFFFFFFFFFFFFFF
-    return result
 
 
 # ---- The flight ------------------------------------------------------------------------------------------------------------
@@ -195,7 +189,8 @@ def count_cycles(log, ticks):
             resampled = 0
             continue
         if name == "pfl_predict":
-            cycles.append({"stages": dict.fromkeys(STAGES, 0), "classes": {}, "low": 0, "high": 0, "resamples": False})
+            cycles.append({"stages": dict.fromkeys(STAGES, 0), "classes": {}, "low": 0, "high": 0, "updates": 0,
+                           "resamples": False})
         if not cycles:
             continue
         cycle, stages = cycles[-1], cycles[-1]["stages"]
@@ -207,6 +202,7 @@ def count_cycles(log, ticks):
             if key.startswith("class_"):
                 cycle["classes"][key[6:]] = cycle["classes"].get(key[6:], 0) + int(value)
         low, _, high = line.get("estimated_m4_cycles", "0..0").partition("..")
+        cycle["updates"] += name == "pfl_update"
         cycle["low"] += int(low)
         cycle["high"] += int(high)
         cycle["resamples"] = cycle["resamples"] or tick[3] > resampled
@@ -221,8 +217,10 @@ def mean(values):
 
 def summarise(cycles, particles):
     totals = [sum(cycle["stages"].values()) for cycle in cycles]
-    resampling = [total for total, cycle in zip(totals, cycles) if cycle["resamples"]]
-    plain = [total for total, cycle in zip(totals, cycles) if not cycle["resamples"]]
+    most = max(cycle["updates"] for cycle in cycles)  # like is compared with like: cycles with all measurements
+    full = [(total, cycle["resamples"]) for total, cycle in zip(totals, cycles) if cycle["updates"] == most]
+    resampling = [total for total, resamples in full if resamples]
+    plain = [total for total, resamples in full if not resamples]
     return {
         "instructions": {"min": min(totals), "mean": mean(totals), "max": max(totals),
                          "per_particle_step": mean(totals) / particles},
@@ -258,6 +256,8 @@ def fly(scenario, machine, options, counted=True):
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     command, said = record(scenario, options, folder)
+    if not (folder / "host.in").exists():
+        raise Failure(f"{scenario} makes no call to the library with these settings: choose a particle filter, --filter", 2)
     image = player(machine, options.optimise)
     write_tape(folder / "host.in", folder / "tape.in", options)
     line = play(machine, image, folder)

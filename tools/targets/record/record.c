@@ -455,6 +455,9 @@ WRAP(pfl_status_t, pfl_forecast,
     pfl_horizon_t ours = *horizon;
 
     check_filter(f);
+    if (horizon->visit != NULL) {
+        stop("a forecast of this study is looked at step by step, which no tape holds");
+    }
     put((uint32_t)TAPE_FORECAST);
     put(cov != NULL ? 1u : 0u);
     put(horizon->step_us);
