@@ -28,25 +28,6 @@ static const char *const trace_columns[] = {
 };
 enum { TRACE_COLUMNS = sizeof trace_columns / sizeof trace_columns[0] };
 
-/* Position of a value among the choices of a setting, which stand in the order of the enumeration they stand for. */
-static unsigned choice_index(const study_t *study, const char *key)
-{
-    const char *value = study_value(study, key);
-    const size_t length = strlen(value);
-    const char *choice = NULL;
-    unsigned index = 0u;
-
-    for (size_t i = 0u; i < sizeof settings / sizeof settings[0]; i++) {
-        choice = strcmp(settings[i].key, key) == 0 ? settings[i].choices : choice;
-    }
-    while (choice != NULL && (strncmp(choice, value, length) != 0 || strchr("|", choice[length]) == NULL)) {
-        choice = strchr(choice, '|');
-        choice = choice == NULL ? NULL : choice + 1;
-        index++;
-    }
-    return index;
-}
-
 static void read_settings(const study_t *study, land_study_t *s)
 {
     static const double sigma_w[LAND_CASES] = {5.0, 10.0, 15.0};
@@ -54,13 +35,13 @@ static void read_settings(const study_t *study, land_study_t *s)
 
     s->filter = strcmp(study->filter, "pf") == 0 ? LAND_PF : LAND_KF;
     s->filter = strcmp(study->filter, "ukf") == 0 ? LAND_UKF : s->filter;
-    s->tuning = (land_tuning_t)choice_index(study, "ukf");
-    s->case_index = choice_index(study, "case");
+    s->tuning = (land_tuning_t)study_choice(study, "ukf");
+    s->case_index = study_choice(study, "case");
     s->std_reading = study_is(study, "reading", "std");
     s->uncertain = study_is(study, "start", "uncertain");
     s->jitter = study_is(study, "jitter", "on");
     s->theta = (float)study_number(study, "theta");
-    s->resampling = (pfl_resampling_t)choice_index(study, "resampling");
+    s->resampling = (pfl_resampling_t)study_choice(study, "resampling");
     s->particles = study->particles;
     s->seed = study->seed;
     s->w_variance = sigma_w[s->case_index] * (s->std_reading ? sigma_w[s->case_index] : 1.0);

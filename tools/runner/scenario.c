@@ -41,6 +41,25 @@ bool study_is(const study_t *study, const char *key, const char *value)
     return strcmp(study_value(study, key), value) == 0;
 }
 
+unsigned study_choice(const study_t *study, const char *key)
+{
+    const char *value = study_value(study, key);
+    const size_t length = strlen(value);
+    const char *choice = NULL;
+    unsigned index = 0u;
+
+    for (size_t i = 0u; i < study->scenario->settings_count; i++) {
+        const setting_t *setting = &study->scenario->settings[i];
+        choice = strcmp(setting->key, key) == 0 ? setting->choices : choice;
+    }
+    while (choice != NULL && (strncmp(choice, value, length) != 0 || strchr("|", choice[length]) == NULL)) {
+        choice = strchr(choice, '|');
+        choice = choice == NULL ? NULL : choice + 1;
+        index++;
+    }
+    return index;
+}
+
 double study_number(const study_t *study, const char *key)
 {
     return strtod(study_value(study, key), NULL);

@@ -43,6 +43,8 @@ typedef struct {
 const char *study_value(const study_t *study, const char *key);
 bool study_is(const study_t *study, const char *key, const char *value);
 double study_number(const study_t *study, const char *key);
+/* Position of the value among the setting's choices: they stand in the order of an enumeration of the scenario's. */
+unsigned study_choice(const study_t *study, const char *key);
 
 /* A name for the study among those of a campaign, fit for a file: scenario, filter, and what is not as by default but
  * runs and seed. */

@@ -23,25 +23,6 @@ static const setting_t settings[] = {
     {"ql", NULL, 0.0, 10.0, "0", "road: acceleration noise across in m/s^2; 0: the page's"},
 };
 
-/* Position of a value among the choices of a setting, which stand in the order of the enumeration they stand for. */
-static unsigned choice_index(const study_t *study, const char *key)
-{
-    const char *value = study_value(study, key);
-    const size_t length = strlen(value);
-    const char *choice = NULL;
-    unsigned index = 0u;
-
-    for (size_t i = 0u; i < sizeof settings / sizeof settings[0]; i++) {
-        choice = strcmp(settings[i].key, key) == 0 ? settings[i].choices : choice;
-    }
-    while (choice != NULL && (strncmp(choice, value, length) != 0 || strchr("|", choice[length]) == NULL)) {
-        choice = strchr(choice, '|');
-        choice = choice == NULL ? NULL : choice + 1;
-        index++;
-    }
-    return index;
-}
-
 /* Settings that the page does not change: at their defaults? */
 static bool is_as_page(const study_t *study)
 {
@@ -90,9 +71,9 @@ static bool read_settings(const study_t *study, standoff_study_t *s, failure_t *
     s->ekf = strncmp(study->filter, "ekf", 3u) == 0;
     s->constrained = strncmp(study->filter, "cpf", 3u) == 0;
     s->uavs = strstr(study->filter, "multi") != NULL ? 2u : 1u;
-    s->motion = (standoff_motion_t)choice_index(study, "motion");
-    s->guidance = (standoff_guidance_t)choice_index(study, "guidance");
-    s->fallback = (standoff_fallback_t)choice_index(study, "fallback");
+    s->motion = (standoff_motion_t)study_choice(study, "motion");
+    s->guidance = (standoff_guidance_t)study_choice(study, "guidance");
+    s->fallback = (standoff_fallback_t)study_choice(study, "fallback");
     s->outages = study_is(study, "visibility", "inout");
     s->euler_plant = study_is(study, "plant", "euler");
     s->calm = study_is(study, "truth", "calm");

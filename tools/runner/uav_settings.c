@@ -22,25 +22,6 @@ const setting_t uav_settings[UAV_SETTINGS] = {
 static const uav_set_t set_s = {'S', 0.25, 0.7, 5u, {1.2, 1.2, 1.0, 1.0, 0.1, 0.2}};
 static const uav_set_t set_g = {'G', 0.5, 1.0, 1u, {2.5, 2.5, 1.0, 1.0, 0.1, 0.2}};
 
-/* Position of a value among the choices of a setting, which stand in the order of the enumeration they stand for. */
-static unsigned choice_index(const study_t *study, const char *key)
-{
-    const char *value = study_value(study, key);
-    const size_t length = strlen(value);
-    const char *choice = NULL;
-    unsigned index = 0u;
-
-    for (size_t i = 0u; i < UAV_SETTINGS; i++) {
-        choice = strcmp(uav_settings[i].key, key) == 0 ? uav_settings[i].choices : choice;
-    }
-    while (choice != NULL && (strncmp(choice, value, length) != 0 || strchr("|", choice[length]) == NULL)) {
-        choice = strchr(choice, '|');
-        choice = choice == NULL ? NULL : choice + 1;
-        index++;
-    }
-    return index;
-}
-
 static bool near(double a, double b)
 {
     return a - b < 1e-9 && b - a < 1e-9;
@@ -119,14 +100,14 @@ static void read_filter(const study_t *study, uav_study_t *s)
 {
     s->ekf = strcmp(study->filter, "ekf") == 0;
     if (!study_is(study, "filter_wind", "auto")) {
-        s->wind_model = (uav_wind_model_t)(choice_index(study, "filter_wind") - 1u);
+        s->wind_model = (uav_wind_model_t)(study_choice(study, "filter_wind") - 1u);
     }
     if (!study_is(study, "kernel", "auto")) {
         s->kernel = study_is(study, "kernel", "on");
     }
     set_page_resampling(s);
     if (!study_is(study, "scheme", "auto")) {
-        s->scheme = (pfl_resampling_t)(choice_index(study, "scheme") - 1u);
+        s->scheme = (pfl_resampling_t)(study_choice(study, "scheme") - 1u);
     }
     if (!study_is(study, "nlim", "auto")) {
         s->resample_below = study_number(study, "nlim");
@@ -176,7 +157,7 @@ static bool is_as_page(const uav_study_t *s)
 bool uav_read_settings(const study_t *study, uav_study_t *s, failure_t *failure)
 {
     memset(s, 0, sizeof *s);
-    s->sim = (uav_sim_t)choice_index(study, "sim");
+    s->sim = (uav_sim_t)study_choice(study, "sim");
     s->particles = study->particles;
     s->seed = study->seed;
     set_page(s);

@@ -7,6 +7,7 @@ import shutil
 import struct
 import subprocess
 
+import machines
 from machines import ROOT
 
 BUILD = ROOT / "build/target"
@@ -177,14 +178,21 @@ def plug_arguments(machine, image, log):
     return ",".join([str(plugin()), f"out={log}", f"blocks={log}.blocks", f"from={where['io_open']}", *calls, *parts])
 
 
-def count_cycles(log, ticks):
-    """Cycles as dictionaries of instructions by stage, with what the plugin tells of them."""
+COUNTER_SLACK = 32  # instructions between the port's reading of its counter and the call
+
+
+def count_cycles(log, ticks, per_instruction):
+    """Cycles as dictionaries of instructions by stage, with what the plugin tells of them. The port's own counter, where
+    there is one, must say the same of every call."""
     cycles, resampled = [], 0
     lines = [dict(pair.split("=") for pair in line.split()) for line in log.read_text().splitlines()]
     counted = [(OPERATIONS[t[0]], t) for t in ticks if t[0] in OPERATIONS]
     if [line["call"] for line in lines] != [name for name, _ in counted]:
         raise Failure("the plugin's calls are not those of the player")
     for line, (name, tick) in zip(lines, counted):
+        if per_instruction and abs(tick[1] / per_instruction - int(line["instructions"])) > COUNTER_SLACK:
+            raise Failure(f"{name}: the port counts {tick[1] / per_instruction:.0f} instructions, the plugin "
+                          f"{line['instructions']}", 1)
         if name == "pfl_init":
             resampled = 0
             continue
@@ -242,13 +250,22 @@ def count(machine, image, folder, particles, ticks):
     play(machine, image, folder, plug_arguments(machine, image, folder / "calls.txt"))
     if (folder / "tape.out").read_bytes() != before:
         raise Failure(f"{machine.name}: two plays of one tape differ", 1)
-    return summarise(count_cycles(folder / "calls.txt", ticks), particles)
+    return summarise(count_cycles(folder / "calls.txt", ticks, machine.ticks), particles)
 
 
 def compiler_of(machine):
     command = machine.prefix + "gcc" if machine.emulator else machine.cmake[0].split("=")[1]
     line = subprocess.run([command, "--version"], check=True, capture_output=True, text=True).stdout.splitlines()[0]
     return f"{command} {re.search(r'([0-9]+[.][0-9]+[.][0-9]+)', line).group(1)}"
+
+
+def play_here(folder, options):
+    here = folder / "here"
+    here.mkdir()
+    shutil.copy(folder / "tape.in", here)
+    machine = machines.find("host-gcc-O3")
+    line = play(machine, player(machine, options.optimise), here)
+    return (here / "tape.out").read_bytes(), line
 
 
 def fly(scenario, machine, options, counted=True):
@@ -262,21 +279,21 @@ def fly(scenario, machine, options, counted=True):
     write_tape(folder / "host.in", folder / "tape.in", options)
     line = play(machine, image, folder)
     ours, host = (folder / "tape.out").read_bytes(), (folder / "host.out").read_bytes()
-    changed = options.ess_ratio is not None or options.sharpen is not None
-    whole = not options.steps or len(ours) == len(host)
+    as_flown = options.ess_ratio is None and options.sharpen is None and (not options.steps or len(ours) == len(host))
     result = {
         "schema": 1, "scenario": scenario, "target": machine.name, "compiler": compiler_of(machine),
         "optimisation": f"-{options.optimise}" if machine.toolchain else machine.what.split(", ")[1],
         "particles": words(folder / "host.in")[5], "steps": int(line["cycles"]), "instructions_not_cycles": True,
         "arena_bytes": int(line["arena"]),
     }
-    if changed:  # the runner flew something else: nothing to compare with but the host's own player
-        result |= {"hash": line["hash"], "host_hash": None, "same_bits": True}
-    elif whole and ours == host:
+    if not as_flown:  # not what the runner flew: the player on this machine flies it too, from the same tape
+        theirs, their_line = play_here(folder, options)
+        result |= {"hash": line["hash"], "host_hash": their_line["hash"], "same_bits": ours == theirs}
+    elif ours == host:  # the runner again, on the target's answers: its hash is that of the target's estimates
         _, replayed = runner(command, folder, PFLIGHT_TAPE_PLAY=str(folder / "tape.out"))
         result |= {"hash": replayed["hash"], "host_hash": said["hash"], "same_bits": replayed["hash"] == said["hash"]}
     else:
-        result |= {"hash": line["hash"], "host_hash": said["hash"], "same_bits": not whole and host.startswith(ours)}
+        result |= {"hash": line["hash"], "host_hash": said["hash"], "same_bits": False}
     ticks = words(folder / "tape.ticks")
     ticks = [ticks[i:i + 4] for i in range(0, len(ticks), 4)]
     stack = {}

@@ -61,5 +61,10 @@ ALL = [
 ]
 
 
+def runs_here(machine):
+    """Builds for x86-64-v3 need a processor with AVX2."""
+    return not machine.name.endswith("-v3") or " avx2 " in pathlib.Path("/proc/cpuinfo").read_text()
+
+
 def find(name):
     return next(machine for machine in ALL if machine.name == name)

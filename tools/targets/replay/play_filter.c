@@ -162,6 +162,11 @@ bool play_init(play_t *p)
     const uint32_t stop = pfl_port_cycles();
     play_count(p, TAPE_INIT, mark, stop);
     words_put(IO_OUT, (uint32_t)(int32_t)status);
+    if (p->filter == NULL) {
+        io_text("play: pfl_init: ");
+        io_text(pfl_status_string(status));
+        io_text("\n");
+    }
     return p->filter != NULL;
 }
 
