@@ -1,4 +1,4 @@
-/* memcpy, memmove and memset of the bare-metal images: a word at a time where both sides allow it. Compilers turn loops
+/* memcpy, memmove, memset and strlen of the bare-metal images: a word at a time where both sides allow it. Compilers turn loops
  * into calls of these, so this file is built with -fno-tree-loop-distribute-patterns. */
 #include <stddef.h>
 #include <stdint.h>
@@ -6,6 +6,7 @@
 void *memcpy(void *to, const void *from, size_t n);
 void *memmove(void *to, const void *from, size_t n);
 void *memset(void *to, int value, size_t n);
+size_t strlen(const char *text);
 
 void *memcpy(void *to, const void *from, size_t n)
 {
@@ -66,4 +67,13 @@ void *memset(void *to, int value, size_t n)
         n--;
     }
     return to;
+}
+
+size_t strlen(const char *text)
+{
+    size_t n = 0u;
+    while (text[n] != '\0') {
+        n++;
+    }
+    return n;
 }
