@@ -95,7 +95,7 @@ void test_ekf_converges(void)
         const double angle = 5.0 * 0.5 * (double)k / 98.0;
         const double x = 98.0 * cos(angle);
         const double y = 98.0 * sin(angle);
-        const standoff_sight_t sight = {60.0, 0.0, hypot(x - 60.0, y), atan2(y, x - 60.0)};
+        const standoff_sight_t sight = {60.0, 0.0, hypot(x - 60.0, y), atan2(y, x - 60.0), true};
         TEST_ASSERT_TRUE(standoff_ekf_step(&s, &sight, &ekf, &belief));
         if (k == 200u) {
             TEST_ASSERT_DOUBLE_WITHIN(0.05, x, belief.target[TARGET_X]);

@@ -10,6 +10,8 @@ static const setting_t settings[] = {
      "the filter's model: constant velocity, aligned with the road, on its lane"},
     {"guidance", "lvfg|lvfg+|nmpc|nmpc+", 0.0, 0.0, "lvfg", "the paper's laws, and ours with a +"},
     {"visibility", "inout|in", 0.0, 0.0, "inout", "inout: the target is not seen for 10 s, twice"},
+    {"gating", "off|on", 0.0, 0.0, "off",
+     "on: a UAV measures only while its camera, on the last estimate, has the target"},
     {"plant", "zoh|euler", 0.0, 0.0, "zoh", "the UAVs' lags: exact, or by the paper's Euler step"},
     {"truth", "paper|calm", 0.0, 0.0, "paper", "how the target drives: restless as calibrated to the paper, or calm"},
     {"tries", NULL, 1.0, 256.0, "4", "cpf, cv: draws a particle has to stay on the road"},
@@ -26,7 +28,7 @@ static const setting_t settings[] = {
 /* Settings that the page does not change: at their defaults? */
 static bool is_as_page(const study_t *study)
 {
-    static const char *const keys[] = {"theta", "kernel", "parts", "reach", "qa", "ql"};
+    static const char *const keys[] = {"gating", "theta", "kernel", "parts", "reach", "qa", "ql"};
     bool same = true;
 
     for (size_t k = 0u; k < sizeof keys / sizeof keys[0]; k++) {
@@ -75,6 +77,7 @@ static bool read_settings(const study_t *study, standoff_study_t *s, failure_t *
     s->guidance = (standoff_guidance_t)study_choice(study, "guidance");
     s->fallback = (standoff_fallback_t)study_choice(study, "fallback");
     s->outages = study_is(study, "visibility", "inout");
+    s->gated = study_is(study, "gating", "on");
     s->euler_plant = study_is(study, "plant", "euler");
     s->calm = study_is(study, "truth", "calm");
     s->kernel_width = study_number(study, "kernel");

@@ -42,6 +42,7 @@ typedef struct {
     standoff_guidance_t guidance;
     standoff_fallback_t fallback;
     bool outages;
+    bool gated; /* a UAV measures only what its camera has in view */
     bool euler_plant;
     bool calm;
     uint32_t tries;
@@ -77,6 +78,7 @@ typedef struct {
 /* A measurement of one UAV. */
 typedef struct {
     double from_x_m, from_y_m, range_m, bearing_rad;
+    bool seen; /* by this UAV, in this step */
 } standoff_sight_t;
 
 /* What became of a flight. */
@@ -120,7 +122,7 @@ typedef struct standoff_pf standoff_pf_t;
 standoff_pf_t *standoff_pf_open(const standoff_study_t *s, uint32_t run, const double *prior, failure_t *failure);
 void standoff_pf_close(standoff_pf_t *pf);
 
-/* A filter cycle; sight: of each UAV, null in an outage. */
+/* A filter cycle; sight: of each UAV, null when none sees the target. */
 bool standoff_pf_step(standoff_pf_t *pf, unsigned k, const standoff_sight_t *sight, standoff_belief_t *belief,
                       uint32_t *cycles_ns, cycle_t *cycle, failure_t *failure);
 

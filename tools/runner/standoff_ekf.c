@@ -84,7 +84,7 @@ bool standoff_ekf_step(const standoff_study_t *s, const standoff_sight_t *sight,
 
     predict(ekf);
     for (unsigned i = 0u; sight != NULL && done && i < s->uavs; i++) {
-        done = update(&sight[i], ekf);
+        done = !sight[i].seen || update(&sight[i], ekf);
     }
     const double c = cos(x[ARC] / ROAD_CENTER_LINE_M);
     const double sine = sin(x[ARC] / ROAD_CENTER_LINE_M);

@@ -135,11 +135,15 @@ static void record_end(flight_t *f)
 
 static bool filter_step(flight_t *f, unsigned k, uint32_t *cycles_ns, cycle_t *cycle, failure_t *failure)
 {
-    const bool visible = !f->s->outages || !standoff_is_out(k);
+    const bool possible = !f->s->outages || !standoff_is_out(k);
+    bool visible = false;
     standoff_sight_t sight[STANDOFF_UAVS];
 
     for (unsigned i = 0u; i < f->s->uavs; i++) {
         sight[i] = standoff_see(f->track, k, i, &f->uav[i]);
+        /* Before the first estimate the cameras are pointed by hand. */
+        sight[i].seen = possible && (!f->s->gated || k == 1u || !has_lost(f, f->track->target[k], &f->uav[i]));
+        visible = visible || sight[i].seen;
     }
     if (f->pf != NULL) {
         return standoff_pf_step(f->pf, k, visible ? sight : NULL, &f->belief, cycles_ns, cycle, failure);

@@ -280,7 +280,8 @@ static bool update(standoff_pf_t *pf, unsigned k, unsigned first_sensor, const s
     for (unsigned i = 0u; i < pf->study->uavs; i++) {
         const pfl_range_bearing_z_t z = {(float)sight[i].from_x_m, (float)sight[i].from_y_m, (float)sight[i].range_m,
                                          (float)sight[i].bearing_rad};
-        if (!check(pfl_update(pf->filter, (uint16_t)(first_sensor + i), t_us, &z), "pfl_update", k, failure)) {
+        if (sight[i].seen &&
+            !check(pfl_update(pf->filter, (uint16_t)(first_sensor + i), t_us, &z), "pfl_update", k, failure)) {
             return false;
         }
     }

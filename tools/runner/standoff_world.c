@@ -130,5 +130,6 @@ standoff_sight_t standoff_see(const standoff_track_t *track, unsigned k, unsigne
         uav->y_m,
         hypot(dx, dy) + SENSOR_RANGE_SIGMA_M * track->noise[k][index][0],
         atan2(dy, dx) + SENSOR_BEARING_SIGMA_RAD * track->noise[k][index][1],
+        true,
     };
 }
