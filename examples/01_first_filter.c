@@ -23,7 +23,7 @@ static void barometer(void *user, const void *z, const pfl_view_t *p, float *ll)
 
 int main(void)
 {
-    static const pfl_sensor_t sensors[] = {{barometer, NULL, 0.0f}};
+    static const pfl_sensor_t sensors[] = {{.loglik = barometer}};
     static const pfl_config_t config = {.abi = PFL_ABI,
                                         .particles = 300,
                                         .states = 2,

@@ -40,8 +40,8 @@ static pfl_status_t fuse(pfl_t *f, uint64_t t_us, float y_m)
 
 int main(void)
 {
-    static const pfl_sensor_t sensors[] = {{pfl_range_loglik, &range, 10.8f},
-                                           {pfl_range_bearing_loglik, &radar, 13.8f}};
+    static const pfl_sensor_t sensors[] = {{.loglik = pfl_range_loglik, .user = &range, .gate = 10.8f},
+                                           {.loglik = pfl_range_bearing_loglik, .user = &radar, .gate = 13.8f}};
     static const pfl_config_t config = {.abi = PFL_ABI,
                                         .particles = PARTICLES,
                                         .states = PFL_CV_STATES,

@@ -30,6 +30,10 @@ set(PFLIGHT_LIB_SOURCES
   forecast.c
   meter.c
   status.c
+  guard.c
+  watch.c
+  health.c
+  scrub.c
   self_test.c
   model_land_vehicle.c
   model_constant_velocity.c
@@ -57,6 +61,7 @@ set(PFLIGHT_LIB_HEADERS
   constraints.h
   filter.h
   guidance.h
+  health.h
   math.h
   models.h
   port.h

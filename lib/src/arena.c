@@ -1,5 +1,5 @@
 /* Checks a configuration, carves the arena, and guards the door of every call. */
-#include "core.h"
+#include "guard.h"
 
 #include "pflight/port.h"
 
@@ -33,6 +33,21 @@ static bool box_is_good(const pfl_config_t *c)
     return true;
 }
 
+static bool watch_is_good(const pfl_config_t *c)
+{
+    const pfl_watch_t *w = c->watch;
+    if (w == NULL) {
+        return true;
+    }
+    bool good = pfl_is_finite(w->lean_ratio) && (w->lean_ratio >= 0.0f) && (w->lean_ratio <= 1.0f) &&
+                pfl_is_finite(w->reinject) && (w->reinject >= 0.0f) && (w->reinject <= 1.0f) &&
+                ((w->ok_sigma == NULL) || (c->moments == (uint16_t)PFL_MOMENTS_FULL));
+    for (uint32_t d = 0u; (w->ok_sigma != NULL) && (d < c->states); d++) {
+        good = good && pfl_is_not_nan(w->ok_sigma[d]) && (w->ok_sigma[d] > 0.0f);
+    }
+    return good;
+}
+
 static bool options_are_good(const pfl_config_t *c)
 {
     const pfl_constraint_t *k = c->constraint;
@@ -42,7 +57,7 @@ static bool options_are_good(const pfl_config_t *c)
     const bool jitter = (kernel == NULL) || ((c->moments == (uint16_t)PFL_MOMENTS_FULL) &&
                                              pfl_is_finite(kernel->width) && (kernel->width > 0.0f) &&
                                              (kernel->width < 1.0f) && ((kernel->states_mask >> c->states) == 0u));
-    return constraint && jitter;
+    return constraint && jitter && watch_is_good(c);
 }
 
 bool pfl_config_is_good(const pfl_config_t *c)
@@ -65,13 +80,14 @@ size_t pfl_arena_bytes(const pfl_config_t *config)
     }
     const bool retries = (config->constraint != NULL) && (config->constraint->tries > 1u);
     return PFL_ARENA_BYTES(config->particles, config->states, config->noises) +
-           (retries ? PFL_RETRY_BYTES(config->states) : 0u);
+           (retries ? PFL_RETRY_BYTES(config->states) : 0u) +
+           ((config->watch != NULL) ? PFL_WATCH_BYTES(config->sensor_count) : 0u);
 }
 
 pfl_status_t pfl_lay_out(void *arena, size_t arena_bytes, const pfl_config_t *c, pfl_t **out)
 {
     const size_t d = c->states;
-    const size_t stride = PFL_CEIL8(c->particles);
+    const size_t stride = PFL_STRIDE(c->particles);
     if ((arena == NULL) || (((uintptr_t)arena & 7u) != 0u) || (arena_bytes < pfl_arena_bytes(c))) {
         return PFL_ERR_MEMORY;
     }
@@ -92,10 +108,15 @@ pfl_status_t pfl_lay_out(void *arena, size_t arena_bytes, const pfl_config_t *c,
     next += PFL_LANE_FLOATS(d);
     f->work = next;
     next += PFL_WORK_FLOATS(d, c->noises);
-    f->x = next;
+    f->x = next + PFL_CANARY_FLOATS;
     f->log_weight = f->x + (d * stride);
-    f->scratch = f->log_weight + stride;
-    f->retry = ((c->constraint != NULL) && (c->constraint->tries > 1u)) ? (f->scratch + stride) : NULL;
+    f->scratch = f->log_weight + stride + PFL_CANARY_FLOATS;
+    next = f->scratch + stride + PFL_CANARY_FLOATS;
+    if (c->watch != NULL) {
+        f->sensor = (pfl_sensor_track_t *)(void *)next;
+        next += PFL_WATCH_BYTES(c->sensor_count) / sizeof(float);
+    }
+    f->retry = ((c->constraint != NULL) && (c->constraint->tries > 1u)) ? next : NULL;
     *out = f;
     return PFL_OK;
 }
@@ -110,16 +131,28 @@ pfl_status_t pfl_enter(const pfl_t *f)
     if (f == NULL) {
         return PFL_ERR_ARG;
     }
-    if (!pfl_is_alive(f)) {
-        return PFL_ERR_CORRUPT;
+    const pfl_status_t intact = pfl_guard_look(f);
+    if (intact != PFL_OK) {
+        return intact;
     }
     return (f->busy != 0u) ? PFL_ERR_BUSY : PFL_OK;
 }
 
 pfl_status_t pfl_begin(pfl_t *f)
 {
-    const pfl_status_t entered = pfl_enter(f);
-    return (entered == PFL_ERR_BUSY) ? pfl_fault(f, entered) : entered;
+    if (f == NULL) {
+        return PFL_ERR_ARG;
+    }
+    const pfl_status_t opened = pfl_guard_open(f);
+    if (opened != PFL_OK) {
+        return opened;
+    }
+    return (f->busy != 0u) ? pfl_fault(f, PFL_ERR_BUSY) : PFL_OK;
+}
+
+pfl_status_t pfl_end(pfl_t *f, pfl_status_t status)
+{
+    return pfl_guard_close(f, status);
 }
 
 void pfl_count(uint32_t *counter, uint32_t more)
@@ -127,8 +160,28 @@ void pfl_count(uint32_t *counter, uint32_t more)
     *counter = ((UINT32_MAX - *counter) > more) ? (*counter + more) : UINT32_MAX;
 }
 
+/* The mask's bit for a status of the fault class. */
+static uint32_t fault_bit(pfl_status_t status)
+{
+    switch (status) {
+    case PFL_ERR_NONFINITE:
+        return PFL_FAULT_NONFINITE;
+    case PFL_ERR_LOGLIK:
+        return PFL_FAULT_LOGLIK;
+    case PFL_ERR_BUDGET:
+        return PFL_FAULT_BUDGET;
+    case PFL_ERR_BUSY:
+        return PFL_FAULT_BUSY;
+    case PFL_ERR_CORRUPT:
+        return PFL_FAULT_CANARY;
+    default:
+        return 0u; /* quarantined particles have an event of their own */
+    }
+}
+
 pfl_status_t pfl_fault(pfl_t *f, pfl_status_t status)
 {
+    f->watched.fault |= fault_bit(status);
     pfl_count(&f->faulted, 1u);
     pfl_port_fault((int32_t)status);
     return status;

@@ -21,6 +21,7 @@
 #define PFL_NOINLINE
 #endif
 
+#define PFL_COPY_WORDS 112u   /* room for the sealed part of the control block on 64-bit machines */
 #define PFL_ALIVE 0x70666C79u /* "pfly": the arena holds a filter */
 #define PFL_GROUP 16u         /* particles in the first batch of a predict, which decides whether to go on */
 
@@ -36,26 +37,57 @@ typedef struct {
     uint32_t used;  /* counted in this filter cycle */
 } pfl_meter_t;
 
+/* What the watch knows of the filter, and the four masks. */
+typedef struct {
+    uint64_t since_us; /* start of the phase, or of the calm that will end it */
+    uint32_t phase;    /* pfl_phase_t */
+    uint32_t fault, reject, mode, event;
+    uint32_t refused;     /* measurements refused in a row */
+    uint32_t lean;        /* updates in a row with a low effective sample size */
+    uint32_t settled;     /* measurements fused since the last reset */
+    uint32_t quarantined; /* particles, in this filter cycle */
+    float best_loglik;
+    float ratio_before; /* worst test ratio when the filter was lost or reset */
+} pfl_watched_t;
+
+/* What the watch knows of one sensor. */
+typedef struct {
+    uint64_t t_fused_us;
+    float test_ratio;
+    uint32_t refused; /* in a row */
+    uint32_t content; /* hash of the last measurement */
+    uint32_t same;    /* in a row with that content */
+    uint32_t seen;    /* content is one of a measurement */
+    uint32_t unused;
+} pfl_sensor_track_t;
+
+/* In three parts, of which guard.c keeps watch: what no callback lives to see changed, what a call changes, and what is
+ * its own guard. */
 struct pfl {
     uint32_t alive;
-    uint32_t busy; /* 1 inside a callback */
-    const pfl_config_t *config;
-    uint64_t t_us;
     uint32_t stride;
-    float *mean;         /* D */
-    float *best;         /* D: state of the most likely particle */
-    float *centre;       /* D: what moments are taken about */
+    const pfl_config_t *config;
+    float *mean;                /* D */
+    float *best;                /* D: state of the most likely particle */
+    float *centre;              /* D: what moments are taken about */
+    float *delta;               /* D: jump of the mean at the last reset */
+    float *cov;                 /* D (D + 1) / 2, upper triangle row by row */
+    float *kernel_mean;         /* D: mean of the resampled cloud */
+    float *kernel_cov;          /* D (D + 1) / 2: its covariance, then the root of it */
+    float *lanes;               /* eight partial sums of each moment; saved particles during a predict */
+    float *work;                /* PFL_BATCH x (max(D, Q) + 1) */
+    float *x;                   /* D columns of `stride` */
+    float *log_weight;          /* column */
+    float *scratch;             /* column */
+    float *retry;               /* PFL_BATCH x 2 D: a batch before its move, and a new attempt; null without retries */
+    pfl_sensor_track_t *sensor; /* sensor_count; null without a watch */
+    uint32_t config_hash, parts_hash;
+    uint64_t t_us;
+
+    uint64_t reset_t_us;
+    uint64_t t_fused_us;
+    uint32_t busy;       /* 1 inside a callback */
     uint32_t best_index; /* the most likely particle's */
-    float *delta;        /* D: jump of the mean at the last reset */
-    float *cov;          /* D (D + 1) / 2, upper triangle row by row */
-    float *kernel_mean;  /* D: mean of the resampled cloud */
-    float *kernel_cov;   /* D (D + 1) / 2: its covariance, then the root of it */
-    float *lanes;        /* eight partial sums of each moment; saved particles during a predict */
-    float *work;         /* PFL_BATCH x (max(D, Q) + 1) */
-    float *x;            /* D columns of `stride` */
-    float *log_weight;   /* column */
-    float *scratch;      /* column */
-    float *retry;        /* PFL_BATCH x 2 D: a batch before its move, and a new attempt; null without retries */
     float log_weight_top;
     float weight_sum; /* of the weights that `scratch` holds, if it does */
     float test_ratio;
@@ -63,27 +95,32 @@ struct pfl {
     uint32_t scratch_is_weights; /* scratch[i] = weight i, current */
     uint32_t moments_current;    /* mean, cov belong to the filter's time: MOMENTS_ */
     uint32_t resample_pending;   /* put off by the budget */
-    uint64_t reset_t_us;
-    uint64_t t_fused_us;
     pfl_meter_t meter;
-    uint32_t fused, rejected, faulted, resampled, quarantined, resets, overruns;
+    uint32_t fused, rejected, faulted, resampled, quarantined, resets, overruns, mended;
     uint32_t overrun_counted; /* this cycle's overrun is in `overruns` */
     uint32_t cycles_max, cycles_resample;
     uint32_t redrawn, projected;
-    pfl_rng_t rng;
+    pfl_watched_t watched;
+
+    uint32_t seal;                 /* hash of all above, between calls */
+    uint32_t open;                 /* during a call */
+    uint32_t copy[PFL_COPY_WORDS]; /* of all above, between calls */
+    pfl_rng_t rng;                 /* unguarded: any state but zero is as good as any other */
 };
 
 /* arena.c */
 bool pfl_config_is_good(const pfl_config_t *c);
 pfl_status_t pfl_lay_out(void *arena, size_t arena_bytes, const pfl_config_t *c, pfl_t **out);
 bool pfl_is_alive(const pfl_t *f);
-pfl_status_t pfl_enter(const pfl_t *f); /* PFL_OK, or why a call on f cannot start */
-pfl_status_t pfl_begin(pfl_t *f);       /* the same, and a call from inside a callback is counted as a fault */
+pfl_status_t pfl_enter(const pfl_t *f); /* PFL_OK, or why a call that only reads f cannot start */
+pfl_status_t pfl_begin(pfl_t *f);       /* the same for a call that changes f: it ends with pfl_end */
+pfl_status_t pfl_end(pfl_t *f, pfl_status_t status);
 pfl_status_t pfl_fault(pfl_t *f, pfl_status_t status); /* counts a fault, tells the port, returns the status */
 
 void pfl_count(uint32_t *counter, uint32_t more); /* adds, and stays at the end of its range */
 
 /* predict.c */
+uint32_t pfl_quarantine(pfl_t *f, uint32_t first, uint32_t n);
 void pfl_make_noise(pfl_t *f, uint32_t columns, uint32_t n);
 void pfl_clip_to_box(pfl_t *f, uint32_t first, uint32_t n);
 pfl_batch_t pfl_batch_at(pfl_t *f, uint32_t first, uint32_t n);
@@ -122,6 +159,22 @@ void pfl_weights(pfl_t *f); /* only the weights, into the scratch column, where 
 /* resample.c */
 void pfl_resample_now(pfl_t *f);
 bool pfl_resample_is_due(const pfl_t *f);
+
+/* watch.c */
+void pfl_watch_start(pfl_t *f);
+void pfl_watch_cycle(pfl_t *f);                       /* a filter cycle begins */
+void pfl_watch_moved(pfl_t *f, uint32_t quarantined); /* a predict ended */
+void pfl_watch_fused(pfl_t *f, uint16_t sensor);
+void pfl_watch_refused(pfl_t *f, uint16_t sensor);
+void pfl_watch_reset(pfl_t *f, uint32_t event);                           /* event: PFL_EVENT_RESET or _REINJECTED */
+pfl_status_t pfl_watch_content(pfl_t *f, uint16_t sensor, const void *z); /* refuses what stands still or comes twice */
+float pfl_worst_ratio(const pfl_t *f);
+
+/* scrub.c */
+bool pfl_revive_random(pfl_t *f); /* seeds dead streams anew; true when there were such */
+
+/* reset.c */
+void pfl_reinject(pfl_t *f, uint16_t sensor, const void *z);
 
 /* meter.c */
 void pfl_meter_begin(pfl_t *f);    /* of a filter cycle */

@@ -4,12 +4,8 @@
 #include "rng_kernels.h"
 #include "sqrt_kernel.h"
 
-pfl_status_t pfl_estimate(pfl_t *f, float *mean, float *cov)
+static pfl_status_t estimate(pfl_t *f, float *mean, float *cov)
 {
-    const pfl_status_t entered = pfl_begin(f);
-    if (entered != PFL_OK) {
-        return entered;
-    }
     const uint32_t states = f->config->states;
     if (mean == NULL) {
         return PFL_ERR_ARG;
@@ -31,6 +27,12 @@ pfl_status_t pfl_estimate(pfl_t *f, float *mean, float *cov)
         }
     }
     return PFL_OK;
+}
+
+pfl_status_t pfl_estimate(pfl_t *f, float *mean, float *cov)
+{
+    const pfl_status_t entered = pfl_begin(f);
+    return (entered == PFL_OK) ? pfl_end(f, estimate(f, mean, cov)) : entered;
 }
 
 pfl_status_t pfl_most_likely(const pfl_t *f, float *state)
@@ -114,12 +116,8 @@ static uint64_t weight_up_to(const pfl_t *f, const float *x, uint32_t key)
     return sum;
 }
 
-pfl_status_t pfl_quantile(pfl_t *f, uint16_t state, float p, float *value)
+static pfl_status_t quantile(pfl_t *f, uint16_t state, float p, float *value)
 {
-    const pfl_status_t entered = pfl_begin(f);
-    if (entered != PFL_OK) {
-        return entered;
-    }
     if ((value == NULL) || (state >= f->config->states) || !(p > 0.0f) || !(p <= 1.0f)) {
         return PFL_ERR_ARG;
     }
@@ -147,36 +145,13 @@ pfl_status_t pfl_quantile(pfl_t *f, uint16_t state, float p, float *value)
     return PFL_OK;
 }
 
-/* ---- Health --------------------------------------------------------------------------------------------------- */
-
-pfl_status_t pfl_health(const pfl_t *f, pfl_health_t *out)
+pfl_status_t pfl_quantile(pfl_t *f, uint16_t state, float p, float *value)
 {
-    if ((f == NULL) || (out == NULL)) {
-        return PFL_ERR_ARG;
-    }
-    if (!pfl_is_alive(f)) {
-        return PFL_ERR_CORRUPT;
-    }
-    memset(out, 0, sizeof *out);
-    out->t_us = f->t_us;
-    out->t_fused_us = f->t_fused_us;
-    out->ess = f->ess;
-    out->test_ratio = f->test_ratio;
-    out->fused = f->fused;
-    out->rejected = f->rejected;
-    out->faulted = f->faulted;
-    out->resampled = f->resampled;
-    out->quarantined = f->quarantined;
-    out->redrawn = f->redrawn;
-    out->projected = f->projected;
-    out->resets = f->resets;
-    out->overruns = f->overruns;
-    out->cycles_last = f->meter.used;
-    out->cycles_max = f->cycles_max;
-    out->cycles_resample = f->cycles_resample;
-    out->counter_usable = f->meter.mask != 0u;
-    return PFL_OK;
+    const pfl_status_t entered = pfl_begin(f);
+    return (entered == PFL_OK) ? pfl_end(f, quantile(f, state, p, value)) : entered;
 }
+
+/* ---- Invariants ------------------------------------------------------------------------------------------------ */
 
 bool pfl_invariants_hold(const pfl_t *f)
 {
@@ -184,7 +159,7 @@ bool pfl_invariants_hold(const pfl_t *f)
         return false;
     }
     const uint32_t count = f->config->particles;
-    bool hold = (f->stride == PFL_CEIL8(count)) && pfl_rng_alive(&f->rng) && (f->busy == 0u) &&
+    bool hold = (f->stride == PFL_STRIDE(count)) && pfl_rng_alive(&f->rng) && (f->busy == 0u) &&
                 pfl_is_finite(f->log_weight_top) && (f->ess >= 1.0f) && (f->ess <= (float)count);
     for (uint32_t d = 0u; d < f->config->states; d++) {
         const float *x = &f->x[(size_t)d * f->stride];

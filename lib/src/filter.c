@@ -1,5 +1,5 @@
 /* A filter's life and its cycle: init, predict, update. */
-#include "core.h"
+#include "guard.h"
 
 #include "pflight/port.h"
 
@@ -16,6 +16,7 @@ pfl_status_t pfl_draw_prior(pfl_t *f)
             f->busy = 1u;
             f->config->draw(f->config->user, &batch);
             f->busy = 0u;
+            pfl_guard_after_callback(f);
         }
         if (pfl_count_nonfinite(f, first, n) != 0u) {
             return PFL_ERR_NONFINITE;
@@ -55,37 +56,54 @@ pfl_status_t pfl_init(void *arena, size_t arena_bytes, const pfl_config_t *confi
     f->t_fused_us = t_us;
     f->meter.mask = pfl_port_self_test() ? pfl_port_cycles_mask() : 0u;
     pfl_rng_seed(&f->rng, config->seed);
-    const pfl_status_t drawn = pfl_draw_prior(f);
-    if (drawn != PFL_OK) {
-        return pfl_fault(f, drawn);
+    pfl_watch_start(f);
+    pfl_guard_start(f);
+    pfl_status_t status = pfl_draw_prior(f);
+    if (status == PFL_OK) {
+        f->alive = PFL_ALIVE;
+        status = pfl_guard_close(f, PFL_OK);
+    } else {
+        (void)pfl_fault(f, status);
     }
-    f->alive = PFL_ALIVE;
-    *out = f;
-    return PFL_OK;
+    *out = (status == PFL_OK) ? f : NULL;
+    return status;
 }
 
 /* ---- Predict -------------------------------------------------------------------------------------------------- */
 
-pfl_status_t pfl_predict(pfl_t *f, uint64_t t_us, const void *u)
+/* A time stamp that does not fit is worth a bit in the mask, but nothing went wrong in here. */
+static pfl_status_t misfit(pfl_t *f, pfl_status_t status)
 {
-    const pfl_status_t entered = pfl_begin(f);
-    if (entered != PFL_OK) {
-        return entered;
-    }
-    if (t_us < f->t_us) {
-        return PFL_ERR_TIME;
-    }
+    f->watched.fault |= PFL_FAULT_TIME;
+    return status;
+}
+
+static pfl_status_t predict(pfl_t *f, uint64_t t_us, const void *u)
+{
     if (t_us == f->t_us) {
         return PFL_OK;
     }
-    if ((t_us - f->t_us) > UINT32_MAX) {
-        return PFL_ERR_GAP;
+    if (t_us < f->t_us) {
+        return misfit(f, PFL_ERR_TIME);
     }
+    if ((t_us - f->t_us) > UINT32_MAX) {
+        return misfit(f, PFL_ERR_GAP);
+    }
+    pfl_watch_cycle(f);
+    (void)pfl_revive_random(f);
     pfl_meter_begin(f);
     pfl_meter_resume(f);
+    const uint32_t before = f->quarantined;
     const pfl_status_t status = pfl_propagate(f, (uint32_t)(t_us - f->t_us), u);
     pfl_meter_pause(f);
+    pfl_watch_moved(f, f->quarantined - before);
     return status;
+}
+
+pfl_status_t pfl_predict(pfl_t *f, uint64_t t_us, const void *u)
+{
+    const pfl_status_t entered = pfl_begin(f);
+    return (entered == PFL_OK) ? pfl_end(f, predict(f, t_us, u)) : entered;
 }
 
 /* ---- Update --------------------------------------------------------------------------------------------------- */
@@ -106,6 +124,7 @@ PFL_NOINLINE static pfl_status_t weigh(pfl_t *f, const pfl_sensor_t *sensor, con
         f->busy = 1u;
         sensor->loglik(user, z, &view, &f->scratch[first]);
         f->busy = 0u;
+        pfl_guard_after_callback(f);
         pfl_weigh_batch(f, first, n, &f->scratch[first], w);
     }
     return PFL_OK;
@@ -119,8 +138,9 @@ PFL_NOINLINE static pfl_status_t judge(pfl_t *f, const pfl_sensor_t *sensor, con
         const bool positive = (w->worst_bits >= 0) && (w->worst_bits < 0x7F800000);
         return pfl_fault(f, positive ? PFL_ERR_LOGLIK : PFL_ERR_NONFINITE);
     }
+    const float best = pfl_from_bits(w->best_bits) + PFL_LOGLIK_MAX;
+    f->watched.best_loglik = pfl_is_finite(best) ? best : -FLT_MAX;
     if (sensor->gate > 0.0f) {
-        const float best = pfl_from_bits(w->best_bits) + PFL_LOGLIK_MAX;
         const float ratio = (-2.0f * best) / sensor->gate;
         f->test_ratio = pfl_is_finite(ratio) ? ((ratio > 0.0f) ? ratio : 0.0f) : FLT_MAX;
     } else {
@@ -171,25 +191,43 @@ static pfl_status_t fuse(pfl_t *f, const pfl_sensor_t *sensor, const void *z)
     return PFL_OK;
 }
 
-pfl_status_t pfl_update(pfl_t *f, uint16_t sensor, uint64_t t_us, const void *z)
+/* The sensor hangs: what it says again and again is no news. */
+static pfl_status_t refuse_frozen(pfl_t *f)
 {
-    const pfl_status_t entered = pfl_begin(f);
-    if (entered != PFL_OK) {
-        return entered;
-    }
+    f->watched.event |= PFL_EVENT_FROZEN;
+    pfl_count(&f->rejected, 1u);
+    return PFL_REJECTED;
+}
+
+static pfl_status_t update(pfl_t *f, uint16_t sensor, uint64_t t_us, const void *z)
+{
     if (z == NULL) {
         return PFL_ERR_ARG;
     }
     if (sensor >= f->config->sensor_count) {
         return PFL_ERR_SENSOR;
     }
-    if (t_us != f->t_us) {
-        return PFL_ERR_TIME;
+    const pfl_status_t content = (t_us == f->t_us) ? pfl_watch_content(f, sensor, z) : PFL_ERR_TIME;
+    if (content == PFL_ERR_TIME) {
+        return misfit(f, content);
     }
     pfl_meter_resume(f);
-    const pfl_status_t status = fuse(f, &f->config->sensors[sensor], z);
+    const pfl_status_t status = (content == PFL_OK) ? fuse(f, &f->config->sensors[sensor], z) : refuse_frozen(f);
+    if (status >= PFL_OK) {
+        pfl_watch_fused(f, sensor);
+    }
+    if (status == PFL_REJECTED) {
+        pfl_watch_refused(f, sensor);
+        pfl_reinject(f, sensor, z);
+    }
     pfl_meter_pause(f);
     return status;
+}
+
+pfl_status_t pfl_update(pfl_t *f, uint16_t sensor, uint64_t t_us, const void *z)
+{
+    const pfl_status_t entered = pfl_begin(f);
+    return (entered == PFL_OK) ? pfl_end(f, update(f, sensor, t_us, z)) : entered;
 }
 
 pfl_status_t pfl_resample(pfl_t *f)
@@ -203,5 +241,5 @@ pfl_status_t pfl_resample(pfl_t *f)
     pfl_weights(f);
     pfl_resample_now(f);
     pfl_meter_pause(f);
-    return PFL_OK;
+    return pfl_end(f, PFL_OK);
 }

@@ -1,5 +1,5 @@
 /* Copies of a filter, and prediction to a horizon on such a copy. */
-#include "core.h"
+#include "guard.h"
 
 static float *moved(const float *p, const pfl_t *from, pfl_t *to)
 {
@@ -36,7 +36,11 @@ pfl_status_t pfl_fork(const pfl_t *f, void *arena, size_t arena_bytes, pfl_t **o
     copy->kernel_mean = moved(f->kernel_mean, f, copy);
     copy->kernel_cov = moved(f->kernel_cov, f, copy);
     copy->retry = (f->retry != NULL) ? moved(f->retry, f, copy) : NULL;
+    copy->sensor = (f->sensor != NULL)
+                       ? (pfl_sensor_track_t *)(void *)moved((const float *)(const void *)f->sensor, f, copy)
+                       : NULL;
     pfl_rng_long_jump(&copy->rng);
+    pfl_guard_start(copy);
     *out = copy;
     return PFL_OK;
 }

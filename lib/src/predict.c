@@ -1,6 +1,6 @@
 /* Prediction: every particle through the model, in batches with fresh noise, all-or-nothing where it can be, and what
  * happens to particles that come out non-finite or outside their box. */
-#include "core.h"
+#include "guard.h"
 
 /* ---- Particles that are not finite ---------------------------------------------------------------------------- */
 
@@ -39,7 +39,7 @@ PFL_NOINLINE static bool batch_is_suspect(const pfl_t *f, uint32_t first, uint32
 }
 
 /* Non-finite particles take the state of the most likely one, which is finite, and lose their weight. */
-PFL_NOINLINE static uint32_t quarantine(pfl_t *f, uint32_t first, uint32_t n)
+PFL_NOINLINE uint32_t pfl_quarantine(pfl_t *f, uint32_t first, uint32_t n)
 {
     uint32_t found = 0u;
     for (uint32_t i = first; i < (first + n); i++) {
@@ -108,6 +108,7 @@ static bool first_group_survives(pfl_t *f, const void *u, float dt_s, uint32_t n
     const pfl_batch_t batch = pfl_batch_at(f, 0u, n);
     pfl_make_noise(f, f->config->noises, n);
     f->config->predict(f->config->user, u, dt_s, &batch);
+    pfl_guard_after_callback(f);
     const bool survives = !batch_is_suspect(f, 0u, n) || (pfl_count_nonfinite(f, 0u, n) < n);
     if (survives && !rehearsal) {
         return true;
@@ -135,10 +136,11 @@ PFL_NOINLINE static pfl_status_t step(pfl_t *f, const void *u, float dt_s, bool 
             const pfl_batch_t batch = pfl_batch_at(f, first, n);
             pfl_make_noise(f, f->config->noises, n);
             f->config->predict(f->config->user, u, dt_s, &batch);
+            pfl_guard_after_callback(f);
         }
         pfl_constrain(f, u, dt_s, first, n);
         if (batch_is_suspect(f, first, n)) {
-            *lost += quarantine(f, first, n);
+            *lost += pfl_quarantine(f, first, n);
         }
         pfl_clip_to_box(f, first, n);
         first += n;

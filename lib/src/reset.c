@@ -1,5 +1,5 @@
 /* Starting anew from the prior, and the account of it that a controller downstream needs. */
-#include "core.h"
+#include "guard.h"
 
 #include "math_kernels.h"
 
@@ -16,34 +16,94 @@ static void gather_at_mean(pfl_t *f, const float *mean)
     (void)pfl_moments(f, false);
 }
 
-pfl_status_t pfl_reset(pfl_t *f, uint64_t t_us)
+/* Delta holds the mean before; it becomes the jump. */
+static void account(pfl_t *f, uint32_t event)
 {
-    const pfl_status_t entered = pfl_begin(f);
-    if (entered != PFL_OK) {
-        return entered;
+    for (uint32_t d = 0u; d < f->config->states; d++) {
+        const float jump = f->mean[d] - f->delta[d];
+        f->delta[d] = (((f->config->circular_mask >> d) & 1u) != 0u) ? pfl_wrap_pi_kernel(jump) : jump;
     }
+    f->reset_t_us = f->t_us;
+    f->resample_pending = 0u;
+    pfl_count(&f->resets, 1u);
+    pfl_watch_reset(f, event);
+}
+
+static pfl_status_t reset(pfl_t *f, uint64_t t_us)
+{
     if (f->config->draw == NULL) {
         return PFL_ERR_NO_DRAW;
     }
-    const uint32_t states = f->config->states;
     pfl_refresh(f);
-    memcpy(f->delta, f->mean, sizeof(float) * states); /* the mean before, until the jump is known */
+    memcpy(f->delta, f->mean, sizeof(float) * f->config->states);
     const pfl_status_t drawn = pfl_draw_prior(f);
     if (drawn != PFL_OK) {
         gather_at_mean(f, f->delta);
     }
-    for (uint32_t d = 0u; d < states; d++) {
-        const float jump = f->mean[d] - f->delta[d];
-        f->delta[d] = (((f->config->circular_mask >> d) & 1u) != 0u) ? pfl_wrap_pi_kernel(jump) : jump;
-    }
     f->t_us = t_us;
-    f->reset_t_us = t_us;
     f->t_fused_us = t_us;
     f->test_ratio = 0.0f;
-    f->resample_pending = 0u;
-    pfl_count(&f->resets, 1u);
+    account(f, PFL_EVENT_RESET);
     return (drawn == PFL_OK) ? PFL_OK : pfl_fault(f, drawn);
 }
+
+pfl_status_t pfl_reset(pfl_t *f, uint64_t t_us)
+{
+    const pfl_status_t entered = pfl_begin(f);
+    return (entered == PFL_OK) ? pfl_end(f, reset(f, t_us)) : entered;
+}
+
+/* ---- Reinjection (Lenser and Veloso 2000: sensor resetting) ---------------------------------------------------- */
+
+static void redraw(pfl_t *f, const pfl_sensor_t *sensor, const void *z, const pfl_batch_t *batch)
+{
+    f->busy = 1u;
+    if (sensor->redraw != NULL) {
+        sensor->redraw((sensor->user != NULL) ? sensor->user : f->config->user, z, batch);
+    } else {
+        f->config->draw(f->config->user, batch);
+    }
+    f->busy = 0u;
+    pfl_guard_after_callback(f);
+}
+
+/* The refusals of this sensor have just reached another multiple of the limit. */
+static bool reinjection_is_due(const pfl_t *f, uint16_t sensor)
+{
+    const pfl_watch_t *watch = f->config->watch;
+    const pfl_sensor_t *s = &f->config->sensors[sensor];
+    if ((watch == NULL) || !(watch->reinject > 0.0f) || ((s->redraw == NULL) && (f->config->draw == NULL))) {
+        return false;
+    }
+    return f->watched.phase == (uint32_t)PFL_PHASE_LOST;
+}
+
+void pfl_reinject(pfl_t *f, uint16_t sensor, const void *z)
+{
+    if (!reinjection_is_due(f, sensor)) {
+        return;
+    }
+    const uint32_t count = f->config->particles;
+    const uint32_t share = (uint32_t)(f->config->watch->reinject * (float)count);
+    const uint32_t drawn = (share > 0u) ? share : 1u;
+    pfl_refresh(f);
+    memcpy(f->delta, f->mean, sizeof(float) * f->config->states);
+    pfl_weights(f);
+    pfl_resample_now(f);
+    for (uint32_t first = count - drawn; first < count; first += PFL_BATCH) {
+        const uint32_t n = ((count - first) < PFL_BATCH) ? (count - first) : PFL_BATCH;
+        const pfl_batch_t batch = pfl_batch_at(f, first, n);
+        pfl_make_noise(f, f->config->states, n);
+        redraw(f, &f->config->sensors[sensor], z, &batch);
+        (void)pfl_quarantine(f, first, n);
+        pfl_clip_to_box(f, first, n);
+    }
+    pfl_weights_equal(f);
+    (void)pfl_moments(f, false);
+    account(f, PFL_EVENT_REINJECTED);
+}
+
+/* ---- The account ----------------------------------------------------------------------------------------------- */
 
 pfl_status_t pfl_last_reset(const pfl_t *f, uint32_t *count, uint64_t *t_us, float *delta)
 {

@@ -1,6 +1,6 @@
 /* Known answers at power-on: does this build, on this processor, in this floating-point mode, compute what every other
  * build computes? Each part is hashed against a constant that all supported compilers and targets agree on. */
-#include "core.h"
+#include "guard.h"
 
 #include "math_kernels.h"
 
@@ -112,7 +112,7 @@ static void scatter(void *user, const pfl_batch_t *p)
 /* A short flight by each resampling scheme. */
 static pfl_status_t fly(void *arena, size_t arena_bytes, pfl_resampling_t scheme, uint64_t *hash)
 {
-    const pfl_sensor_t sensor = {bearing, NULL, 0.0f};
+    const pfl_sensor_t sensor = {.loglik = bearing};
     pfl_config_t config;
     memset(&config, 0, sizeof config);
     config.abi = PFL_ABI;
@@ -147,6 +147,7 @@ static pfl_status_t fly(void *arena, size_t arena_bytes, pfl_resampling_t scheme
     }
     if (f != NULL) {
         f->alive = 0u; /* leave no filter behind whose configuration is gone */
+        (void)pfl_guard_close(f, PFL_OK);
     }
     return status;
 }

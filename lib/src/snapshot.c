@@ -1,6 +1,6 @@
 /* A filter as bytes and back: little-endian 32-bit words, so that a recorder on one machine feeds a replay on another.
  *
- *     magic, version, N, D, Q, counters and clocks, random generator, moments, states, log-weights, CRC-32
+ *     magic, version, N, D, Q, counters and clocks, the watch, random generator, moments, states, log-weights, CRC-32
  *
  * A restore looks at every word before it changes the first one. */
 #include "core.h"
@@ -8,8 +8,9 @@
 #include "rng_kernels.h"
 
 #define SNAPSHOT_MAGIC 0x73706670u /* "pfps" */
-#define SNAPSHOT_VERSION 1u
-#define HEAD_WORDS 28u
+#define SNAPSHOT_VERSION 2u
+#define HEAD_WORDS 43u
+#define TRACK_WORDS 6u
 #define RNG_WORDS ((4u * PFL_RNG_LANES) + 4u)
 
 static size_t moment_words(size_t states)
@@ -17,10 +18,16 @@ static size_t moment_words(size_t states)
     return (3u * states) + ((states * (states + 1u)) / 2u);
 }
 
+static size_t tracked(const pfl_t *f)
+{
+    return (f->sensor != NULL) ? f->config->sensor_count : 0u;
+}
+
 static size_t total_words(const pfl_t *f)
 {
     const size_t states = f->config->states;
-    return HEAD_WORDS + RNG_WORDS + moment_words(states) + ((size_t)f->config->particles * (states + 1u)) + 1u;
+    return HEAD_WORDS + (TRACK_WORDS * tracked(f)) + RNG_WORDS + moment_words(states) +
+           ((size_t)f->config->particles * (states + 1u)) + 1u;
 }
 
 static void put_word(unsigned char *at, uint32_t word)
@@ -96,8 +103,38 @@ static void head_of(const pfl_t *f, uint32_t head[HEAD_WORDS])
                                         f->config->moments,
                                         f->redrawn,
                                         f->projected,
-                                        f->best_index};
+                                        f->best_index,
+                                        f->mended,
+                                        (uint32_t)tracked(f),
+                                        (uint32_t)f->watched.since_us,
+                                        (uint32_t)(f->watched.since_us >> 32),
+                                        f->watched.phase,
+                                        f->watched.fault,
+                                        f->watched.reject,
+                                        f->watched.mode,
+                                        f->watched.event,
+                                        f->watched.refused,
+                                        f->watched.lean,
+                                        f->watched.settled,
+                                        f->watched.quarantined,
+                                        (uint32_t)pfl_bits(f->watched.best_loglik),
+                                        (uint32_t)pfl_bits(f->watched.ratio_before)};
     memcpy(head, words, sizeof words);
+}
+
+static unsigned char *put_tracks(const pfl_t *f, unsigned char *at)
+{
+    for (size_t k = 0u; k < tracked(f); k++) {
+        const pfl_sensor_track_t *track = &f->sensor[k];
+        put_word(at, (uint32_t)track->t_fused_us);
+        put_word(at + 4, (uint32_t)(track->t_fused_us >> 32));
+        put_word(at + 8, (uint32_t)pfl_bits(track->test_ratio));
+        put_word(at + 12, track->refused);
+        put_word(at + 16, track->content);
+        put_word(at + 20, (track->same << 1) | track->seen);
+        at += 4u * TRACK_WORDS;
+    }
+    return at;
 }
 
 size_t pfl_snapshot_bytes(const pfl_t *f)
@@ -126,6 +163,7 @@ pfl_status_t pfl_snapshot(const pfl_t *f, void *buffer, size_t buffer_bytes)
         put_word(at, head[k]);
         at += 4;
     }
+    at = put_tracks(f, at);
     for (uint32_t k = 0u; k < RNG_WORDS; k++) {
         put_word(at, (k < (4u * PFL_RNG_LANES)) ? f->rng.s[k / PFL_RNG_LANES][k % PFL_RNG_LANES]
                                                 : f->rng.one[k - (4u * PFL_RNG_LANES)]);
@@ -142,6 +180,22 @@ pfl_status_t pfl_snapshot(const pfl_t *f, void *buffer, size_t buffer_bytes)
 
 /* ---- Restore -------------------------------------------------------------------------------------------------- */
 
+static bool watch_fits(const pfl_t *f, const unsigned char *at)
+{
+    return (get_word(at + (4 * 29)) == tracked(f)) && (get_word(at + (4 * 32)) <= (uint32_t)PFL_PHASE_SETTLING) &&
+           pfl_is_finite(pfl_from_bits((int32_t)get_word(at + (4 * 41)))) &&
+           pfl_is_finite(pfl_from_bits((int32_t)get_word(at + (4 * 42))));
+}
+
+static bool tracks_are_good(const pfl_t *f, const unsigned char *at)
+{
+    bool good = true;
+    for (size_t k = 0u; k < tracked(f); k++) {
+        good = good && pfl_is_finite(pfl_from_bits((int32_t)get_word(at + (4u * ((k * TRACK_WORDS) + 2u)))));
+    }
+    return good;
+}
+
 static bool head_fits(const pfl_t *f, const unsigned char *at)
 {
     const float top = pfl_from_bits((int32_t)get_word(at + (4 * 11)));
@@ -154,7 +208,7 @@ static bool head_fits(const pfl_t *f, const unsigned char *at)
     const bool numbers = pfl_is_finite(top) && pfl_is_finite(sum) && pfl_is_finite(ratio) && pfl_is_finite(ess);
     return shape && numbers && (sum > 0.0f) && (ess >= 1.0f) && (ess <= (float)f->config->particles) &&
            (get_word(at + (4 * 15)) <= MOMENTS_OVERFLOWED) && (get_word(at + (4 * 16)) <= 1u) &&
-           (get_word(at + (4 * 27)) < f->config->particles);
+           (get_word(at + (4 * 27)) < f->config->particles) && watch_fits(f, at);
 }
 
 /* Streams alive, moments and states finite, log-weights below their top. */
@@ -163,15 +217,18 @@ static bool body_is_good(const pfl_t *f, const unsigned char *at)
     const float top = pfl_from_bits((int32_t)get_word(at + (4 * 11)));
     const size_t states = f->config->states;
     const size_t finite = moment_words(states) + (states * f->config->particles);
+    const unsigned char *next = at + (4u * HEAD_WORDS);
+    bool good = tracks_are_good(f, next);
+    next += 4u * TRACK_WORDS * tracked(f);
     pfl_rng_t rng;
     for (uint32_t k = 0u; k < (4u * PFL_RNG_LANES); k++) {
-        rng.s[k / PFL_RNG_LANES][k % PFL_RNG_LANES] = get_word(at + (4u * (HEAD_WORDS + k)));
+        rng.s[k / PFL_RNG_LANES][k % PFL_RNG_LANES] = get_word(next + (4u * k));
     }
     for (uint32_t k = 0u; k < 4u; k++) {
-        rng.one[k] = get_word(at + (4u * (HEAD_WORDS + (4u * PFL_RNG_LANES) + k)));
+        rng.one[k] = get_word(next + (4u * ((4u * PFL_RNG_LANES) + k)));
     }
-    bool good = pfl_rng_alive(&rng);
-    const unsigned char *next = at + (4u * (HEAD_WORDS + RNG_WORDS));
+    good = good && pfl_rng_alive(&rng);
+    next += 4u * RNG_WORDS;
     for (size_t k = 0u; k < finite; k++) {
         good = good && pfl_is_finite(pfl_from_bits((int32_t)get_word(next)));
         next += 4;
@@ -210,15 +267,39 @@ static void take_head(pfl_t *f, const unsigned char *at)
     f->redrawn = get_word(at + (4 * 25));
     f->projected = get_word(at + (4 * 26));
     f->best_index = get_word(at + (4 * 27));
+    f->mended = get_word(at + (4 * 28));
+    f->watched.since_us = get_time(at + (4 * 30));
+    f->watched.phase = get_word(at + (4 * 32));
+    f->watched.fault = get_word(at + (4 * 33));
+    f->watched.reject = get_word(at + (4 * 34));
+    f->watched.mode = get_word(at + (4 * 35));
+    f->watched.event = get_word(at + (4 * 36));
+    f->watched.refused = get_word(at + (4 * 37));
+    f->watched.lean = get_word(at + (4 * 38));
+    f->watched.settled = get_word(at + (4 * 39));
+    f->watched.quarantined = get_word(at + (4 * 40));
+    f->watched.best_loglik = pfl_from_bits((int32_t)get_word(at + (4 * 41)));
+    f->watched.ratio_before = pfl_from_bits((int32_t)get_word(at + (4 * 42)));
     f->scratch_is_weights = 0u;
 }
 
-pfl_status_t pfl_restore(pfl_t *f, const void *buffer, size_t buffer_bytes)
+static const unsigned char *take_tracks(pfl_t *f, const unsigned char *at)
 {
-    const pfl_status_t entered = pfl_begin(f);
-    if (entered != PFL_OK) {
-        return entered;
+    for (size_t k = 0u; k < tracked(f); k++) {
+        pfl_sensor_track_t *track = &f->sensor[k];
+        track->t_fused_us = get_time(at);
+        track->test_ratio = pfl_from_bits((int32_t)get_word(at + 8));
+        track->refused = get_word(at + 12);
+        track->content = get_word(at + 16);
+        track->same = get_word(at + 20) >> 1;
+        track->seen = get_word(at + 20) & 1u;
+        at += 4u * TRACK_WORDS;
     }
+    return at;
+}
+
+static pfl_status_t restore(pfl_t *f, const void *buffer, size_t buffer_bytes)
+{
     if (buffer == NULL) {
         return PFL_ERR_ARG;
     }
@@ -230,7 +311,7 @@ pfl_status_t pfl_restore(pfl_t *f, const void *buffer, size_t buffer_bytes)
     }
     const size_t states = f->config->states;
     take_head(f, at);
-    at += 4u * HEAD_WORDS;
+    at = take_tracks(f, at + (4u * HEAD_WORDS));
     for (uint32_t k = 0u; k < RNG_WORDS; k++) {
         uint32_t *word = (k < (4u * PFL_RNG_LANES)) ? &f->rng.s[k / PFL_RNG_LANES][k % PFL_RNG_LANES]
                                                     : &f->rng.one[k - (4u * PFL_RNG_LANES)];
@@ -243,4 +324,10 @@ pfl_status_t pfl_restore(pfl_t *f, const void *buffer, size_t buffer_bytes)
     }
     (void)get_floats(at, f->log_weight, f->config->particles);
     return PFL_OK;
+}
+
+pfl_status_t pfl_restore(pfl_t *f, const void *buffer, size_t buffer_bytes)
+{
+    const pfl_status_t entered = pfl_begin(f);
+    return (entered == PFL_OK) ? pfl_end(f, restore(f, buffer, buffer_bytes)) : entered;
 }

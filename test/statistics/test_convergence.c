@@ -178,7 +178,7 @@ static void compare(const posterior_t *exact, uint32_t k, const float *mean, con
 
 static void fly(uint32_t n, uint16_t scheme, uint64_t seed, const posterior_t *exact, errors_t *sum)
 {
-    const pfl_sensor_t sensor = {see, NULL, 0.0f};
+    const pfl_sensor_t sensor = {.loglik = see};
     float mean[2];
     float cov[4];
     pfl_config_t c;

@@ -81,7 +81,7 @@ static void choose_weights(uint32_t n, bool dead_end)
 static void resample_often(uint32_t n, uint16_t scheme)
 {
     static uint64_t count[N_MAX], square[N_MAX];
-    const pfl_sensor_t sensor = {weigh, NULL, 0.0f};
+    const pfl_sensor_t sensor = {.loglik = weigh};
     const float z = 0.0f;
     pfl_config_t c;
     pfl_view_t view;

@@ -122,7 +122,7 @@ void ut_dictated_loglik(void *user, const void *z, const pfl_view_t *p, float *l
 
 pfl_config_t ut_dictated_config(uint32_t particles, uint16_t states)
 {
-    static const pfl_sensor_t sensor = {ut_dictated_loglik, NULL, 0.0f};
+    static const pfl_sensor_t sensor = {.loglik = ut_dictated_loglik};
     pfl_config_t c;
     memset(&c, 0, sizeof c);
     c.abi = PFL_ABI;
@@ -168,7 +168,7 @@ void ut_linear_loglik(void *user, const void *z, const pfl_view_t *p, float *ll)
 
 pfl_config_t ut_linear_config(uint32_t particles)
 {
-    static const pfl_sensor_t sensor = {ut_linear_loglik, NULL, 0.0f};
+    static const pfl_sensor_t sensor = {.loglik = ut_linear_loglik};
     pfl_config_t c = ut_dictated_config(particles, 2u);
     c.noises = 2u;
     c.ess_ratio = 0.5f;
@@ -204,13 +204,13 @@ bool ut_same_bytes(const unsigned char *a, const unsigned char *b, size_t bytes)
     return memcmp(a, b, bytes) == 0;
 }
 
-/* Words of the snapshot's head (lib/src/snapshot.c): 13 test ratio, 18 rejected, 19 faulted, 23 overruns; the last
- * word is the CRC. */
+/* Words of the snapshot's head (lib/src/snapshot.c): 13 test ratio, 18 rejected, 19 faulted, 23 overruns, from 28
+ * to 42 the watch; the last word is the CRC. */
 bool ut_same_posterior(const unsigned char *a, const unsigned char *b, size_t bytes)
 {
     const size_t words = (bytes / 4u) - 1u;
     for (size_t k = 0u; k < words; k++) {
-        const bool counter = (k == 13u) || (k == 18u) || (k == 19u) || (k == 23u);
+        const bool counter = (k == 13u) || (k == 18u) || (k == 19u) || (k == 23u) || ((k >= 28u) && (k <= 42u));
         if (!counter && (memcmp(a + (4u * k), b + (4u * k), 4u) != 0)) {
             return false;
         }

@@ -21,7 +21,7 @@ static float hi[PFL_STATES_MAX];
 
 void setUp(void)
 {
-    const pfl_sensor_t sensor = {ut_dictated_loglik, NULL, 0.0f};
+    const pfl_sensor_t sensor = {.loglik = ut_dictated_loglik};
     for (uint32_t k = 0u; k <= PFL_SENSORS_MAX; k++) {
         sensors[k] = sensor;
     }

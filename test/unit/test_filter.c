@@ -360,7 +360,7 @@ void test_an_impossible_particle_far_away_does_not_move_the_mean(void)
 
 void test_gate_refuses_beyond_it_and_tells_the_ratio(void)
 {
-    const pfl_sensor_t gated = {ut_dictated_loglik, NULL, 8.0f};
+    const pfl_sensor_t gated = {.loglik = ut_dictated_loglik, .gate = 8.0f};
     pfl_config_t c = ut_dictated_config(N, 1u);
     c.sensors = &gated;
     pfl_t *f = ut_filter(&c);
@@ -500,7 +500,7 @@ void test_losing_the_heaviest_particle_keeps_the_order_of_the_rest(void)
     pfl_view_t view;
     sabotage_t s;
     pfl_config_t c = sabotaged(&s, 0u, 1u, ut_nan(false));
-    const pfl_sensor_t dictated = {ut_dictated_loglik, NULL, 0.0f};
+    const pfl_sensor_t dictated = {.loglik = ut_dictated_loglik};
     c.sensors = &dictated;
     pfl_t *f = ut_filter(&c);
     for (uint32_t i = 0u; i < N; i++) {
@@ -542,7 +542,7 @@ void test_losing_the_only_weight_leaves_a_filter_that_works(void)
 {
     sabotage_t s;
     pfl_config_t c = sabotaged(&s, 9u, 10u, ut_nan(false));
-    const pfl_sensor_t dictated = {ut_dictated_loglik, NULL, 0.0f};
+    const pfl_sensor_t dictated = {.loglik = ut_dictated_loglik};
     c.sensors = &dictated;
     pfl_t *f = ut_filter(&c);
     for (uint32_t i = 0u; i < N; i++) {
@@ -609,7 +609,7 @@ static void selfish_draw(void *user, const pfl_batch_t *p)
 
 static pfl_config_t selfish(void)
 {
-    static const pfl_sensor_t sensor = {selfish_loglik, NULL, 0.0f};
+    static const pfl_sensor_t sensor = {.loglik = selfish_loglik};
     pfl_config_t c = ut_linear_config(N);
     c.predict = selfish_predict;
     c.draw = selfish_draw;
@@ -692,7 +692,7 @@ void test_two_sensors_equal_one_with_the_summed_loglik(void)
 {
     float one[N];
     float two[N];
-    const pfl_sensor_t sensors[2] = {{ut_dictated_loglik, NULL, 0.0f}, {ut_dictated_loglik, NULL, 0.0f}};
+    const pfl_sensor_t sensors[2] = {{.loglik = ut_dictated_loglik}, {.loglik = ut_dictated_loglik}};
     pfl_config_t c = ut_dictated_config(N, 1u);
     c.sensors = sensors;
     c.sensor_count = 2u;
@@ -728,7 +728,7 @@ void test_a_sensor_without_user_gets_the_configurations(void)
     uint32_t five = 5u;
     float weights[N];
     pfl_view_t view;
-    const pfl_sensor_t sensors[2] = {{user_loglik, NULL, 0.0f}, {user_loglik, &five, 0.0f}};
+    const pfl_sensor_t sensors[2] = {{.loglik = user_loglik}, {.loglik = user_loglik, .user = &five}};
     pfl_config_t c = ut_dictated_config(N, 1u);
     c.sensors = sensors;
     c.sensor_count = 2u;

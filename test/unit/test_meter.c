@@ -87,7 +87,7 @@ static void counted_loglik(void *user, const void *z, const pfl_view_t *p, float
 
 static pfl_config_t budgeted(uint32_t budget, float ess_ratio)
 {
-    static const pfl_sensor_t sensor = {counted_loglik, NULL, 0.0f};
+    static const pfl_sensor_t sensor = {.loglik = counted_loglik};
     pfl_config_t c = ut_linear_config(N);
     c.budget_cycles = budget;
     c.ess_ratio = ess_ratio;

@@ -356,7 +356,7 @@ void test_a_snapshot_needs_its_room(void)
 void test_a_snapshot_is_little_endian_and_versioned(void)
 {
     const pfl_config_t c = ut_linear_config(N);
-    const unsigned char head[12] = {0x70u, 0x66u, 0x70u, 0x73u, 1u, 0u, 0u, 0u, (unsigned char)N, 0u, 0u, 0u};
+    const unsigned char head[12] = {0x70u, 0x66u, 0x70u, 0x73u, 2u, 0u, 0u, 0u, (unsigned char)N, 0u, 0u, 0u};
     pfl_t *f = flown(&c, 1u);
     TEST_ASSERT_EQUAL_MEMORY(head, ut_snapshot(f), sizeof head);
 }

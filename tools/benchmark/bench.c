@@ -182,7 +182,7 @@ int main(int argc, char **argv)
         return 2;
     }
     generate(&inputs);
-    const pfl_sensor_t sensor = {pfl_position_loglik, &seen, 0.0f};
+    const pfl_sensor_t sensor = {.loglik = pfl_position_loglik, .user = &seen};
     const pfl_config_t config = config_of((uint32_t)n, &sensor);
     const size_t bytes = PFL_ARENA_BYTES(n, PFL_LAND_STATES, 2u);
     void *arena = malloc(bytes); /* of the benchmark, not of the library */

@@ -12,6 +12,7 @@
 #ifndef PFLIGHT_FILTER_H
 #define PFLIGHT_FILTER_H
 
+#include "pflight/health.h"
 #include "pflight/status.h"
 
 #include <stdbool.h>
@@ -35,7 +36,9 @@ extern "C" {
 
 #define PFL_CEIL8(n) ((((size_t)(n)) + 7u) & ~(size_t)7u)
 #define PFL_MAX(a, b) (((a) > (b)) ? (a) : (b))
-#define PFL_CONTROL_BYTES 512u /* room for the control block, checked when the library is compiled */
+#define PFL_CONTROL_BYTES 1088u /* room for the control block and its copy, checked when the library is compiled */
+#define PFL_CANARY_FLOATS 8u
+#define PFL_STRIDE(n) PFL_CEIL8((size_t)(n) + 1u) /* floats of a column: one canary at least */
 #define PFL_MOMENT_FLOATS(d) (PFL_CEIL8((5u * (size_t)(d)) + ((size_t)(d) * ((size_t)(d) + 1u))))
 #define PFL_LANE_FLOATS(d) (8u * (2u + (3u * (size_t)(d)) + (((size_t)(d) * ((size_t)(d) + 1u)) / 2u)))
 #define PFL_WORK_FLOATS(d, q) ((size_t)PFL_BATCH * ((size_t)PFL_MAX(d, q) + 1u))
@@ -43,8 +46,8 @@ extern "C" {
 /* Bytes of arena for N particles, D states and Q noises: an integer constant expression, exact.
  * About 4 (D + 2) bytes a particle, and 256 (max(D, Q) + 1) of workspace. */
 #define PFL_ARENA_BYTES(n, d, q)                                                                                       \
-    ((size_t)PFL_CONTROL_BYTES +                                                                                       \
-     (4u * (PFL_MOMENT_FLOATS(d) + PFL_LANE_FLOATS(d) + PFL_WORK_FLOATS(d, q) + (PFL_CEIL8(n) * ((size_t)(d) + 2u)))))
+    ((size_t)PFL_CONTROL_BYTES + (4u * (PFL_MOMENT_FLOATS(d) + PFL_LANE_FLOATS(d) + PFL_WORK_FLOATS(d, q) +            \
+                                        (PFL_STRIDE(n) * ((size_t)(d) + 2u)) + (3u * PFL_CANARY_FLOATS))))
 
 /* Defines a static arena: PFL_ARENA(name, N, D, Q); pass `&name` and `sizeof name` to pfl_init. */
 #define PFL_ARENA(name, n, d, q)                                                                                       \
@@ -88,14 +91,23 @@ typedef void (*pfl_loglik_fn)(void *user, const void *z, const pfl_view_t *parti
 /* Draws particles from the prior: sets every state, from D noise columns. Used by pfl_init and pfl_reset. */
 typedef void (*pfl_draw_fn)(void *user, const pfl_batch_t *particles);
 
+/* Draws particles that agree with a measurement (position from a fix, speed from the prior): sets every state, from D
+ * noise columns. */
+typedef void (*pfl_redraw_fn)(void *user, const void *z, const pfl_batch_t *particles);
+
 /* ---- Configuration ------------------------------------------------------------------------------------------ */
 
 /* One kind of measurement. */
 typedef struct {
-    pfl_loglik_fn loglik; /* not null */
-    void *user;           /* handed to loglik; null: the configuration's */
-    float gate;           /* refuse when -2 max_i ll_i > gate (a chi-square quantile for the measurement's dimension:
+    pfl_loglik_fn loglik;  /* not null */
+    void *user;            /* handed to loglik; null: the configuration's */
+    float gate;            /* refuse when -2 max_i ll_i > gate (a chi-square quantile for the measurement's dimension:
                              11.3 for 3 at 99 %); 0: no gate. Finite, >= 0 */
+    pfl_redraw_fn redraw;  /* draws particles that agree with z, for reinjection; null: the configuration's draw */
+    uint32_t timeout_us;   /* with a watch: not fused for longer than this is stale, and degrades; 0: never */
+    uint16_t z_bytes;      /* with a watch: size of *z, so that a measurement whose content stands still or comes twice
+                              is seen; 0: not looked at */
+    uint16_t frozen_after; /* refuse from the so-manieth repetition of the same content on; 0: never */
 } pfl_sensor_t;
 
 /* How offspring are chosen; all four are unbiased and exact in integers. */
@@ -140,6 +152,22 @@ typedef struct {
     uint32_t states_mask; /* bit d set: state d takes part; 0: all do */
 } pfl_kernel_t;
 
+/* Judges the filter's phase (health.h). A zero takes the value in brackets. Needs PFL_WATCH_BYTES(sensors) more arena. */
+typedef struct {
+    const float *ok_sigma;   /* D standard deviations, in the states' units, that TRACKING stays below; infinity: any.
+                                Needs PFL_MOMENTS_FULL. null: none is judged */
+    uint32_t confirm_us;     /* how long TRACKING's conditions hold before it begins [1 s] */
+    uint32_t lost_us;        /* nothing fused for that long: LOST [5 s] */
+    uint16_t lost_rejects;   /* measurements refused in a row: LOST [3] */
+    uint16_t settle_updates; /* fused measurements that end SETTLING, or 1 s [10] */
+    float lean_ratio;        /* an effective sample size below this share of N, twice running, degrades [0.05] */
+    float reinject;          /* when LOST, and a measurement is refused again: the share of the particles that is drawn
+                                anew, by the sensor's redraw or the configuration's draw, 0 .. 1; 0: never. It then
+                                waits for lost_rejects refusals more */
+} pfl_watch_t;
+
+#define PFL_WATCH_BYTES(sensors) (32u * (size_t)(sensors))
+
 /* Constant while the filter lives; may be in flash. A zeroed field means what its comment says. */
 typedef struct {
     uint32_t abi;           /* PFL_ABI */
@@ -162,6 +190,7 @@ typedef struct {
     const pfl_sensor_t *sensors;        /* sensor_count of them */
     const pfl_constraint_t *constraint; /* null: none */
     const pfl_kernel_t *kernel;         /* null: none */
+    const pfl_watch_t *watch;           /* null: no phase is judged */
     pfl_predict_fn predict;             /* not null */
     pfl_draw_fn draw;                   /* null: pfl_init starts all particles at zero, and pfl_reset answers
                                     PFL_ERR_NO_DRAW */
@@ -246,29 +275,21 @@ pfl_status_t pfl_particles(const pfl_t *f, pfl_view_t *view, float *log_weights)
  * PFL_ERR_ARG, PFL_ERR_CORRUPT. O(N). */
 pfl_status_t pfl_farthest(const pfl_t *f, uint16_t x_state, uint16_t y_state, float x, float y, float *distance);
 
-/* What a supervisor wants to know. Counters saturate. */
-typedef struct {
-    uint64_t t_us;            /* the filter's time */
-    uint64_t t_fused_us;      /* time of the last fused measurement */
-    float ess;                /* effective sample size at the last update */
-    float test_ratio;         /* of the last update: -2 max ll / gate; > 1 rejected, < 0.5 normal; 0 without gate */
-    uint32_t fused;           /* measurements fused */
-    uint32_t rejected;        /* measurements answered PFL_REJECTED */
-    uint32_t faulted;         /* calls that ended in a fault: non-finite, log-likelihood > 0, budget, self-call */
-    uint32_t resampled;       /* resamplings */
-    uint32_t quarantined;     /* particles that lost their weight to a non-finite state */
-    uint32_t redrawn;         /* draws beyond each particle's first, for the constraint */
-    uint32_t projected;       /* particles that the constraint had to project */
-    uint32_t resets;          /* resets */
-    uint32_t overruns;        /* filter cycles that spent their budget */
-    uint32_t cycles_last;     /* counter cycles of the last or current filter cycle; 0 without a counter */
-    uint32_t cycles_max;      /* largest cycles_last so far */
-    uint32_t cycles_resample; /* part of cycles_last that was resampling */
-    bool counter_usable;      /* the port has a cycle counter that counts */
-} pfl_health_t;
-
-/* Copies the health. PFL_OK, PFL_ERR_ARG, PFL_ERR_CORRUPT. O(1). */
+/* Phase, masks, counters: health.h tells what each means. PFL_OK, PFL_ERR_ARG, PFL_ERR_CORRUPT. O(sensors). */
 pfl_status_t pfl_health(const pfl_t *f, pfl_health_t *out);
+
+/* One sensor's health. PFL_OK, PFL_ERR_ARG, PFL_ERR_SENSOR, PFL_ERR_CONFIG (no watch), PFL_ERR_CORRUPT. O(1). */
+pfl_status_t pfl_sensor_health(const pfl_t *f, uint16_t sensor, pfl_sensor_health_t *out);
+
+/* The record of the filter cycle so far; taken once, after its last update. PFL_OK, PFL_ERR_ARG, PFL_ERR_CORRUPT.
+ * O(sensors). */
+pfl_status_t pfl_record(const pfl_t *f, pfl_record_t *out);
+
+/* Looks for what memory errors leave behind and mends it: non-finite particles and such outside their box take the
+ * state of the most likely one without weight, impossible log-weights count as zero weight, dead random streams are
+ * seeded anew, canaries are set again. For idle time. *mended, if wanted: repairs made. PFL_OK, PFL_ERR_CONFIG (the
+ * configuration changed: it is the caller's to mend), PFL_ERR_BUSY, PFL_ERR_ARG, PFL_ERR_CORRUPT. O(N D). */
+pfl_status_t pfl_scrub(pfl_t *f, uint32_t *mended);
 
 /* Checks what must always hold: sane control block, finite particles, no NaN or positive weight, random generator
  * not in its dead state. O(N D). */

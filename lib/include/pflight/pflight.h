@@ -5,6 +5,7 @@
 #include "pflight/constraints.h"
 #include "pflight/filter.h"
 #include "pflight/guidance.h"
+#include "pflight/health.h"
 #include "pflight/math.h"
 #include "pflight/models.h"
 #include "pflight/port.h"

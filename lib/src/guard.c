@@ -1,0 +1,204 @@
+/* Guards of the memory that a filter's safety hangs on: configuration, control block, and the gaps between the columns of
+ * the arena. Particles need none: a damaged one dies of its weight, or is quarantined. guard.h tells the switches.
+ *
+ * The control block is sealed between calls: a hash of it, and a copy. Of the block, its copy and the seal the two that
+ * agree are right, so that one flipped bit anywhere is mended without a trace in the results. */
+#include "guard.h"
+
+#include "rng_kernels.h"
+
+#define OPEN 0x6F70656Eu     /* "open": a call is in progress, and the block may differ from its copy */
+#define SENTINEL 0x3F8CAFE5u /* a float near 1.1: harmless where sums run over the padding */
+
+#define SEALED_WORDS (offsetof(struct pfl, seal) / 4u)
+#define CONSTANT_WORDS (offsetof(struct pfl, reset_t_us) / 4u)
+
+typedef char pfl_sealed_part_fits[(sizeof(uint32_t[SEALED_WORDS]) <= sizeof(((struct pfl *)0)->copy)) ? 1 : -1];
+
+static uint32_t word_at(const void *bytes, size_t k)
+{
+    uint32_t word;
+    PFL_COPY(&word, (const unsigned char *)bytes + (4u * k), sizeof word);
+    return word;
+}
+
+/* One to one in each word, so that no change of a single word stays unseen. */
+static uint32_t hash_words(uint32_t hash, const void *bytes, size_t words)
+{
+    for (size_t k = 0u; k < words; k++) {
+        hash = pfl_rotl((hash ^ word_at(bytes, k)) * 0x9E3779B1u, 13u);
+    }
+    return hash;
+}
+
+/* ---- Configuration -------------------------------------------------------------------------------------------- */
+
+static uint32_t hash_of_parts(uint32_t hash, const pfl_config_t *c)
+{
+    hash = hash_words(hash, c->sensors, ((size_t)c->sensor_count * sizeof *c->sensors) / 4u);
+    if (c->lo != NULL) {
+        hash = hash_words(hash, c->lo, c->states);
+        hash = hash_words(hash, c->hi, c->states);
+    }
+    if (c->constraint != NULL) {
+        hash = hash_words(hash, c->constraint, sizeof *c->constraint / 4u);
+    }
+    if (c->kernel != NULL) {
+        hash = hash_words(hash, c->kernel, sizeof *c->kernel / 4u);
+    }
+    if (c->watch != NULL) {
+        hash = hash_words(hash, c->watch, sizeof *c->watch / 4u);
+        hash = (c->watch->ok_sigma != NULL) ? hash_words(hash, c->watch->ok_sigma, c->states) : hash;
+    }
+    return hash;
+}
+
+/* The struct first: a damaged pointer in it must not be followed. */
+static bool config_is_intact(const pfl_t *f)
+{
+    if (PFL_GUARD_CONFIG == 0) {
+        return true;
+    }
+    const uint32_t hash = hash_words(1u, f->config, sizeof *f->config / 4u);
+    return (hash == f->config_hash) && (hash_of_parts(hash, f->config) == f->parts_hash);
+}
+
+/* ---- Control block -------------------------------------------------------------------------------------------- */
+
+static void seal(pfl_t *f)
+{
+    if (PFL_GUARD_CONTROL != 0) {
+        f->seal = hash_words(1u, f, SEALED_WORDS);
+        PFL_COPY(f->copy, f, 4u * SEALED_WORDS);
+    }
+    f->open = 0u;
+}
+
+typedef enum { INTACT, MENDABLE, LOST } damage_t;
+
+static damage_t look_at_block(const pfl_t *f)
+{
+    if ((PFL_GUARD_CONTROL == 0) || (f->open == OPEN) || (hash_words(1u, f, SEALED_WORDS) == f->seal)) {
+        return (f->alive == PFL_ALIVE) ? INTACT : LOST;
+    }
+    const uint32_t block = hash_words(1u, f, SEALED_WORDS);
+    const uint32_t copy = hash_words(1u, f->copy, SEALED_WORDS);
+    const bool alive = word_at(f->copy, 0u) == PFL_ALIVE; /* memory of zeros agrees with itself, too */
+    return (alive && ((copy == f->seal) || (copy == block))) ? MENDABLE : LOST;
+}
+
+/* The copy is right, or it equals the block: then the seal was wrong, and is made anew at the end of the call. */
+static void mend_block(pfl_t *f)
+{
+    PFL_COPY(f, f->copy, 4u * SEALED_WORDS);
+    f->watched.fault |= PFL_FAULT_CONTROL;
+    f->watched.event |= PFL_EVENT_MENDED;
+    pfl_count(&f->mended, 1u);
+}
+
+void pfl_guard_after_callback(pfl_t *f)
+{
+    if (PFL_GUARD_CONTROL == 0) {
+        return;
+    }
+    uint32_t different = 0u;
+    for (size_t k = 0u; k < CONSTANT_WORDS; k++) {
+        different |= word_at(f, k) ^ word_at(f->copy, k);
+    }
+    if (different != 0u) {
+        PFL_COPY(f, f->copy, 4u * CONSTANT_WORDS);
+        f->watched.fault |= PFL_FAULT_CONTROL;
+        f->watched.event |= PFL_EVENT_MENDED;
+        pfl_count(&f->mended, 1u);
+    }
+}
+
+/* ---- Canaries ------------------------------------------------------------------------------------------------- */
+
+/* Canary k of the arena: before the first state, behind each state's last particle, behind each weight column. */
+static float *canary_at(const pfl_t *f, uint32_t k)
+{
+    const size_t states = f->config->states;
+    float *behind = f->x + (states * f->stride);
+    if (k == 0u) {
+        return f->x - 1;
+    }
+    if (k <= states) {
+        return f->x + (((size_t)(k - 1u) * f->stride) + f->config->particles);
+    }
+    return behind + (((size_t)(k - states) * (f->stride + PFL_CANARY_FLOATS)) - PFL_CANARY_FLOATS);
+}
+
+static uint32_t canaries_of(const pfl_t *f)
+{
+    return f->config->states + 3u;
+}
+
+static bool canaries_are_alive(const pfl_t *f)
+{
+    uint32_t different = 0u;
+    for (uint32_t k = 0u; k < canaries_of(f); k++) {
+        different |= pfl_load_u32(canary_at(f, k)) ^ SENTINEL;
+    }
+    return different == 0u;
+}
+
+static void set_canaries(const pfl_t *f)
+{
+    for (uint32_t k = 0u; k < canaries_of(f); k++) {
+        pfl_store_u32(canary_at(f, k), SENTINEL);
+    }
+}
+
+/* ---- Calls ---------------------------------------------------------------------------------------------------- */
+
+void pfl_guard_start(pfl_t *f)
+{
+    f->config_hash = hash_words(1u, f->config, sizeof *f->config / 4u);
+    f->parts_hash = hash_of_parts(f->config_hash, f->config);
+    set_canaries(f);
+    seal(f);
+}
+
+pfl_status_t pfl_guard_look(const pfl_t *f)
+{
+    const damage_t damage = look_at_block(f);
+    if (damage != INTACT) {
+        return PFL_ERR_CORRUPT;
+    }
+    return config_is_intact(f) ? PFL_OK : PFL_ERR_CONFIG;
+}
+
+pfl_status_t pfl_guard_open(pfl_t *f)
+{
+    const damage_t damage = look_at_block(f);
+    if (damage == LOST) {
+        return PFL_ERR_CORRUPT;
+    }
+    if (damage == MENDABLE) {
+        mend_block(f);
+    }
+    if (!config_is_intact(f)) {
+        f->watched.fault |= PFL_FAULT_CONFIG;
+        seal(f);
+        return PFL_ERR_CONFIG;
+    }
+    f->watched.event |= ((f->watched.fault & PFL_FAULT_CONFIG) != 0u) ? PFL_EVENT_MENDED : 0u;
+    f->watched.fault &= ~PFL_FAULT_CONFIG;
+    f->open = OPEN;
+    return PFL_OK;
+}
+
+pfl_status_t pfl_guard_close(pfl_t *f, pfl_status_t status)
+{
+    pfl_status_t answer = status;
+    if ((PFL_GUARD_CANARIES != 0) && !canaries_are_alive(f)) {
+        set_canaries(f);
+        f->watched.fault |= PFL_FAULT_CANARY;
+        f->watched.event |= PFL_EVENT_MENDED;
+        pfl_count(&f->mended, 1u);
+        answer = pfl_fault(f, PFL_ERR_CORRUPT);
+    }
+    seal(f);
+    return answer;
+}

@@ -1,0 +1,44 @@
+/* The guards against memory that changes by itself and callbacks that write where they should not: which of them are
+ * built in, and what each costs where it is not.
+ *
+ *   PFL_GUARD_CONFIG    the configuration, by a hash of its bytes, at the start of every call
+ *   PFL_GUARD_CONTROL   the control block, by a sealed copy, at the start and end of every call, and the part that never
+ *                       changes after each callback
+ *   PFL_GUARD_CANARIES  words between the columns of the arena, at the end of every call
+ *   PFL_GUARD_CALLBACKS what a log-likelihood callback sees is a copy of the particles, and what it writes a bay
+ *
+ * All are on unless the compiler is told -DPFL_GUARD_...=0. The layout of the arena does not depend on them. */
+#ifndef PFL_GUARD_H
+#define PFL_GUARD_H
+
+#include "core.h"
+
+#ifndef PFL_GUARD_CONFIG
+#define PFL_GUARD_CONFIG 1
+#endif
+#ifndef PFL_GUARD_CONTROL
+#define PFL_GUARD_CONTROL 1
+#endif
+#ifndef PFL_GUARD_CANARIES
+#define PFL_GUARD_CANARIES 1
+#endif
+#ifndef PFL_GUARD_CALLBACKS
+#define PFL_GUARD_CALLBACKS 1
+#endif
+
+/* At the start of a call: PFL_OK, PFL_ERR_CONFIG, or PFL_ERR_CORRUPT when the block is beyond repair. */
+pfl_status_t pfl_guard_open(pfl_t *f);
+
+/* The same for a caller that may not change the filter: nothing is mended. */
+pfl_status_t pfl_guard_look(const pfl_t *f);
+
+/* At the end of a call: canaries, then the seal. Returns `status`, or PFL_ERR_CORRUPT when something wrote outside. */
+pfl_status_t pfl_guard_close(pfl_t *f, pfl_status_t status);
+
+/* A new filter's hash of its configuration, canaries and seal. */
+void pfl_guard_start(pfl_t *f);
+
+/* After a callback: the pointers and sizes that never change, from the copy where they did. */
+void pfl_guard_after_callback(pfl_t *f);
+
+#endif

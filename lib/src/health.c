@@ -1,0 +1,83 @@
+/* What a filter tells of its health: everything, one sensor, and the record of a filter cycle. */
+#include "core.h"
+
+typedef char pfl_record_has_32_bytes[(sizeof(pfl_record_t) == 32u) ? 1 : -1];
+
+static uint32_t mode_of(const pfl_t *f)
+{
+    return f->watched.mode | ((f->resample_pending != 0u) ? PFL_MODE_PENDING : 0u);
+}
+
+pfl_status_t pfl_health(const pfl_t *f, pfl_health_t *out)
+{
+    if ((f == NULL) || (out == NULL)) {
+        return PFL_ERR_ARG;
+    }
+    if (!pfl_is_alive(f)) {
+        return PFL_ERR_CORRUPT;
+    }
+    memset(out, 0, sizeof *out);
+    out->t_us = f->t_us;
+    out->t_fused_us = f->t_fused_us;
+    out->ess = f->ess;
+    out->test_ratio = pfl_worst_ratio(f);
+    out->best_loglik = f->watched.best_loglik;
+    out->phase = (pfl_phase_t)f->watched.phase;
+    out->fault = f->watched.fault;
+    out->reject = f->watched.reject;
+    out->mode = mode_of(f);
+    out->event = f->watched.event;
+    out->fused = f->fused;
+    out->rejected = f->rejected;
+    out->faulted = f->faulted;
+    out->resampled = f->resampled;
+    out->quarantined = f->quarantined;
+    out->redrawn = f->redrawn;
+    out->projected = f->projected;
+    out->resets = f->resets;
+    out->mended = f->mended;
+    out->overruns = f->overruns;
+    out->cycles_last = f->meter.used;
+    out->cycles_max = f->cycles_max;
+    out->cycles_resample = f->cycles_resample;
+    out->counter_usable = f->meter.mask != 0u;
+    return PFL_OK;
+}
+
+pfl_status_t pfl_sensor_health(const pfl_t *f, uint16_t sensor, pfl_sensor_health_t *out)
+{
+    const pfl_status_t entered = (out != NULL) ? pfl_enter(f) : PFL_ERR_ARG;
+    if (entered != PFL_OK) {
+        return entered;
+    }
+    if (sensor >= f->config->sensor_count) {
+        return PFL_ERR_SENSOR;
+    }
+    if (f->sensor == NULL) {
+        return PFL_ERR_CONFIG;
+    }
+    const pfl_sensor_track_t *track = &f->sensor[sensor];
+    const pfl_sensor_health_t health = {track->t_fused_us, track->test_ratio, track->refused, track->same};
+    *out = health;
+    return PFL_OK;
+}
+
+pfl_status_t pfl_record(const pfl_t *f, pfl_record_t *out)
+{
+    const pfl_status_t entered = (out != NULL) ? pfl_enter(f) : PFL_ERR_ARG;
+    if (entered != PFL_OK) {
+        return entered;
+    }
+    const float ratio = pfl_worst_ratio(f) * 32.0f;
+    out->t_us = f->t_us;
+    out->ess = f->ess;
+    out->best_loglik = f->watched.best_loglik;
+    out->active = f->config->particles;
+    out->cycles = f->meter.used;
+    out->fault = (uint16_t)f->watched.fault;
+    out->event = (uint16_t)f->watched.event;
+    out->reject = (uint16_t)(f->watched.reject & 0xFFFFu);
+    out->state = (uint8_t)((f->watched.phase & 0xFu) | ((mode_of(f) & 0xFu) << 4));
+    out->ratio = (ratio < 255.0f) ? (uint8_t)ratio : 255u;
+    return PFL_OK;
+}

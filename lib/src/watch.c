@@ -1,0 +1,248 @@
+/* The watch over a filter: which phase it is in, from what its cycles report. health.h tells the phases, filter.h the
+ * limits. Everything that decides a phase stands in this file, so no caller needs a hysteresis of its own. */
+#include "core.h"
+
+#include "sqrt_kernel.h"
+
+#define CONFIRM_US 1000000u
+#define SETTLE_US 1000000u
+#define SETTLE_UPDATES 10u
+#define LOST_US 5000000u
+#define LOST_REJECTS 3u
+#define LEAN_RATIO 0.05f
+#define LEAN_UPDATES 2u
+
+static uint32_t limit(uint32_t configured, uint32_t standard)
+{
+    return (configured != 0u) ? configured : standard;
+}
+
+static uint64_t since(uint64_t now_us, uint64_t then_us)
+{
+    return (now_us > then_us) ? (now_us - then_us) : 0u;
+}
+
+/* ---- What holds now ------------------------------------------------------------------------------------------- */
+
+static bool is_stale(const pfl_t *f)
+{
+    bool stale = false;
+    for (uint32_t k = 0u; k < f->config->sensor_count; k++) {
+        const uint32_t timeout_us = f->config->sensors[k].timeout_us;
+        stale = stale || ((timeout_us != 0u) && (since(f->t_us, f->sensor[k].t_fused_us) > timeout_us));
+    }
+    return stale;
+}
+
+static bool is_wide(const pfl_t *f)
+{
+    const float *ok_sigma = f->config->watch->ok_sigma;
+    const float *variance = f->cov;
+    bool wide = false;
+    for (uint32_t d = 0u; (ok_sigma != NULL) && (d < f->config->states); d++) {
+        wide = wide || !(pfl_sqrt_kernel(*variance) < ok_sigma[d]);
+        variance += f->config->states - d;
+    }
+    return wide;
+}
+
+static void set_mode(pfl_t *f, uint32_t bit, bool on)
+{
+    f->watched.mode = on ? (f->watched.mode | bit) : (f->watched.mode & ~bit);
+}
+
+static bool has_complaint(const pfl_t *f)
+{
+    const pfl_watched_t *w = &f->watched;
+    const uint32_t unusual = PFL_EVENT_OVERRUN | PFL_EVENT_MENDED;
+    const bool many_lost = w->quarantined > (f->config->particles / 100u);
+    return ((w->fault & ~PFL_FAULT_PORT) != 0u) || (w->reject != 0u) || ((w->event & unusual) != 0u) || many_lost ||
+           ((w->mode & (PFL_MODE_STALE | PFL_MODE_WIDE | PFL_MODE_LEAN)) != 0u);
+}
+
+static bool is_lost(const pfl_t *f)
+{
+    const pfl_watch_t *limits = f->config->watch;
+    return (f->watched.refused >= limit(limits->lost_rejects, LOST_REJECTS)) ||
+           (since(f->t_us, f->t_fused_us) > limit(limits->lost_us, LOST_US));
+}
+
+/* ---- Phases --------------------------------------------------------------------------------------------------- */
+
+static void enter(pfl_t *f, pfl_phase_t phase)
+{
+    f->watched.phase = (uint32_t)phase;
+    f->watched.since_us = f->t_us;
+    set_mode(f, PFL_MODE_USABLE, (phase == PFL_PHASE_TRACKING) || (phase == PFL_PHASE_DEGRADED));
+}
+
+float pfl_worst_ratio(const pfl_t *f)
+{
+    float worst = f->test_ratio;
+    for (uint32_t k = 0u; (f->sensor != NULL) && (k < f->config->sensor_count); k++) {
+        worst = (f->sensor[k].test_ratio > worst) ? f->sensor[k].test_ratio : worst;
+    }
+    const bool settling = f->watched.phase == (uint32_t)PFL_PHASE_SETTLING;
+    return (settling && (worst < f->watched.ratio_before)) ? f->watched.ratio_before : worst;
+}
+
+/* A reset must not look better than what made it necessary. */
+static void settle(pfl_t *f)
+{
+    f->watched.settled = 0u;
+    f->watched.refused = 0u;
+    enter(f, PFL_PHASE_SETTLING);
+}
+
+static void judge_calm(pfl_t *f, bool complaint)
+{
+    if (complaint) {
+        f->watched.since_us = f->t_us; /* calm begins anew */
+    } else if (since(f->t_us, f->watched.since_us) >= limit(f->config->watch->confirm_us, CONFIRM_US)) {
+        enter(f, PFL_PHASE_TRACKING);
+    } else {
+        /* calm, but not for long enough */
+    }
+}
+
+static void judge(pfl_t *f)
+{
+    pfl_watched_t *w = &f->watched;
+    const bool complaint = has_complaint(f);
+    if ((w->phase > (uint32_t)PFL_PHASE_INIT) && (w->phase != (uint32_t)PFL_PHASE_LOST) && is_lost(f)) {
+        w->ratio_before = pfl_worst_ratio(f);
+        w->event |= PFL_EVENT_LOST;
+        enter(f, PFL_PHASE_LOST);
+        return;
+    }
+    switch ((pfl_phase_t)w->phase) {
+    case PFL_PHASE_CONVERGING:
+    case PFL_PHASE_DEGRADED:
+        judge_calm(f, complaint);
+        break;
+    case PFL_PHASE_TRACKING:
+        if (complaint) {
+            enter(f, PFL_PHASE_DEGRADED);
+        }
+        break;
+    case PFL_PHASE_SETTLING:
+        if ((w->settled >= limit(f->config->watch->settle_updates, SETTLE_UPDATES)) ||
+            (since(f->t_us, w->since_us) >= SETTLE_US)) {
+            enter(f, complaint ? PFL_PHASE_CONVERGING : PFL_PHASE_TRACKING);
+        }
+        break;
+    case PFL_PHASE_INIT:
+    case PFL_PHASE_LOST:
+    default:
+        break; /* only a fused measurement or a reset leads out */
+    }
+}
+
+/* ---- What the cycle reports ----------------------------------------------------------------------------------- */
+
+void pfl_watch_start(pfl_t *f)
+{
+    for (uint32_t k = 0u; (f->sensor != NULL) && (k < f->config->sensor_count); k++) {
+        f->sensor[k].t_fused_us = f->t_us;
+    }
+    const bool mute = (f->config->budget_cycles != 0u) && (f->meter.mask == 0u);
+    f->watched.fault = mute ? PFL_FAULT_PORT : 0u;
+}
+
+void pfl_watch_cycle(pfl_t *f)
+{
+    f->watched.fault &= PFL_FAULT_PORT;
+    f->watched.event = 0u;
+    f->watched.quarantined = 0u;
+}
+
+void pfl_watch_moved(pfl_t *f, uint32_t quarantined)
+{
+    f->watched.quarantined += quarantined;
+    f->watched.event |= (quarantined != 0u) ? PFL_EVENT_QUARANTINED : 0u;
+    if (f->config->watch != NULL) {
+        set_mode(f, PFL_MODE_STALE, is_stale(f));
+        judge(f);
+    }
+}
+
+void pfl_watch_fused(pfl_t *f, uint16_t sensor)
+{
+    pfl_watched_t *w = &f->watched;
+    const pfl_watch_t *limits = f->config->watch;
+    w->reject &= ~(1u << sensor);
+    if (limits == NULL) {
+        return;
+    }
+    const float lean = (limits->lean_ratio > 0.0f) ? limits->lean_ratio : LEAN_RATIO;
+    w->lean = (f->ess < (lean * (float)f->config->particles)) ? (w->lean + 1u) : 0u;
+    w->refused = 0u;
+    w->settled++;
+    f->sensor[sensor].t_fused_us = f->t_us;
+    f->sensor[sensor].test_ratio = f->test_ratio;
+    f->sensor[sensor].refused = 0u;
+    set_mode(f, PFL_MODE_STALE, is_stale(f));
+    set_mode(f, PFL_MODE_LEAN, w->lean >= LEAN_UPDATES);
+    if (f->moments_current == MOMENTS_CURRENT) {
+        set_mode(f, PFL_MODE_WIDE, is_wide(f));
+    }
+    if (w->phase == (uint32_t)PFL_PHASE_INIT) {
+        enter(f, PFL_PHASE_CONVERGING);
+    } else if (w->phase == (uint32_t)PFL_PHASE_LOST) {
+        settle(f);
+    } else {
+        judge(f);
+    }
+}
+
+void pfl_watch_refused(pfl_t *f, uint16_t sensor)
+{
+    f->watched.reject |= 1u << sensor;
+    if (f->config->watch != NULL) {
+        f->watched.refused++;
+        f->sensor[sensor].test_ratio = f->test_ratio;
+        f->sensor[sensor].refused++;
+        judge(f);
+    }
+}
+
+void pfl_watch_reset(pfl_t *f, uint32_t event)
+{
+    f->watched.event |= event;
+    if ((f->config->watch == NULL) || (f->watched.phase == (uint32_t)PFL_PHASE_INIT)) {
+        return;
+    }
+    if (f->watched.phase != (uint32_t)PFL_PHASE_LOST) {
+        f->watched.ratio_before = pfl_worst_ratio(f);
+    }
+    settle(f);
+}
+
+/* ---- Measurements that stand still, and those that come twice ------------------------------------------------- */
+
+static uint32_t hash_of(const void *z, size_t bytes)
+{
+    uint32_t hash = 0x811C9DC5u; /* FNV-1a */
+    for (size_t k = 0u; k < bytes; k++) {
+        hash = (hash ^ ((const unsigned char *)z)[k]) * 0x01000193u;
+    }
+    return hash;
+}
+
+pfl_status_t pfl_watch_content(pfl_t *f, uint16_t sensor, const void *z)
+{
+    const pfl_sensor_t *s = &f->config->sensors[sensor];
+    if ((f->config->watch == NULL) || (s->z_bytes == 0u)) {
+        return PFL_OK;
+    }
+    pfl_sensor_track_t *track = &f->sensor[sensor];
+    const uint32_t content = hash_of(z, s->z_bytes);
+    const bool same = (content == track->content) && (track->seen != 0u);
+    if (same && (f->t_us == track->t_fused_us)) {
+        return PFL_ERR_TIME;
+    }
+    track->same = same ? (track->same + 1u) : 0u;
+    track->content = content;
+    track->seen = 1u;
+    return ((s->frozen_after != 0u) && (track->same >= s->frozen_after)) ? PFL_REJECTED : PFL_OK;
+}
