@@ -81,7 +81,7 @@ struct pfl {
     float *scratch;             /* column */
     float *retry;               /* PFL_BATCH x 2 D: a batch before its move, and a new attempt; null without retries */
     pfl_sensor_track_t *sensor; /* sensor_count; null without a watch */
-    uint32_t config_hash, parts_hash;
+    uint32_t config_hash, parts_hash, limits_hash;
     uint64_t t_us;
 
     uint64_t reset_t_us;

@@ -48,19 +48,25 @@ static uint32_t hash_of_parts(uint32_t hash, const pfl_config_t *c)
     }
     if (c->watch != NULL) {
         hash = hash_words(hash, c->watch, sizeof *c->watch / 4u);
-        hash = (c->watch->ok_sigma != NULL) ? hash_words(hash, c->watch->ok_sigma, c->states) : hash;
     }
     return hash;
 }
 
-/* The struct first: a damaged pointer in it must not be followed. */
+static uint32_t hash_of_limits(uint32_t hash, const pfl_config_t *c)
+{
+    const bool some = (c->watch != NULL) && (c->watch->ok_sigma != NULL);
+    return some ? hash_words(hash, c->watch->ok_sigma, c->states) : hash;
+}
+
+/* In steps: a damaged pointer must not be followed. */
 static bool config_is_intact(const pfl_t *f)
 {
     if (PFL_GUARD_CONFIG == 0) {
         return true;
     }
     const uint32_t hash = hash_words(1u, f->config, sizeof *f->config / 4u);
-    return (hash == f->config_hash) && (hash_of_parts(hash, f->config) == f->parts_hash);
+    return (hash == f->config_hash) && (hash_of_parts(hash, f->config) == f->parts_hash) &&
+           (hash_of_limits(hash, f->config) == f->limits_hash);
 }
 
 /* ---- Control block -------------------------------------------------------------------------------------------- */
@@ -105,7 +111,7 @@ void pfl_guard_after_callback(pfl_t *f)
     for (size_t k = 0u; k < CONSTANT_WORDS; k++) {
         different |= word_at(f, k) ^ word_at(f->copy, k);
     }
-    if (different != 0u) {
+    if ((different != 0u) && (hash_words(1u, f->copy, SEALED_WORDS) == f->seal)) {
         PFL_COPY(f, f->copy, 4u * CONSTANT_WORDS);
         f->watched.fault |= PFL_FAULT_CONTROL;
         f->watched.event |= PFL_EVENT_MENDED;
@@ -156,6 +162,7 @@ void pfl_guard_start(pfl_t *f)
 {
     f->config_hash = hash_words(1u, f->config, sizeof *f->config / 4u);
     f->parts_hash = hash_of_parts(f->config_hash, f->config);
+    f->limits_hash = hash_of_limits(f->config_hash, f->config);
     set_canaries(f);
     seal(f);
 }

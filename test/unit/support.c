@@ -38,7 +38,8 @@ void *ut_arena(size_t bytes)
 
 void *ut_arena_for(const pfl_config_t *config, size_t *bytes)
 {
-    const size_t needed = PFL_ARENA_BYTES(config->particles, config->states, config->noises);
+    const size_t watch = (config->watch != NULL) ? PFL_WATCH_BYTES(config->sensor_count) : 0u;
+    const size_t needed = PFL_ARENA_BYTES(config->particles, config->states, config->noises) + watch;
     if (bytes != NULL) {
         *bytes = needed;
     }
