@@ -36,16 +36,23 @@ static inline float pfl_from_bits(int32_t i)
     return x;
 }
 
+/* Told again that a float's address is one of a word: a core that cannot load across words would go byte by byte. */
+#if defined(__GNUC__)
+#define PFL_WORD(p) __builtin_assume_aligned((p), sizeof(uint32_t))
+#else
+#define PFL_WORD(p) (p)
+#endif
+
 static inline uint32_t pfl_load_u32(const float *p)
 {
     uint32_t u;
-    PFL_COPY(&u, p, sizeof u);
+    PFL_COPY(&u, PFL_WORD(p), sizeof u);
     return u;
 }
 
 static inline void pfl_store_u32(float *p, uint32_t u)
 {
-    PFL_COPY(p, &u, sizeof u);
+    PFL_COPY(PFL_WORD(p), &u, sizeof u);
 }
 
 static inline bool pfl_is_finite(float x)
