@@ -36,23 +36,27 @@ static inline float pfl_from_bits(int32_t i)
     return x;
 }
 
-/* Told again that a float's address is one of a word: a core that cannot load across words would go byte by byte. */
+/* The word at the address of a float. A copy is not known to be aligned there: a core that cannot load across words
+ * would go byte by byte. */
 #if defined(__GNUC__)
-#define PFL_WORD(p) __builtin_assume_aligned((p), sizeof(uint32_t))
+typedef uint32_t pfl_word_t __attribute__((__may_alias__));
+#define PFL_LOAD_WORD(u, p) ((u) = *(const pfl_word_t *)(p))
+#define PFL_STORE_WORD(p, u) (*(pfl_word_t *)(p) = (u))
 #else
-#define PFL_WORD(p) (p)
+#define PFL_LOAD_WORD(u, p) ((void)memcpy(&(u), (p), sizeof(uint32_t)))
+#define PFL_STORE_WORD(p, u) ((void)memcpy((p), &(u), sizeof(uint32_t)))
 #endif
 
 static inline uint32_t pfl_load_u32(const float *p)
 {
     uint32_t u;
-    PFL_COPY(&u, PFL_WORD(p), sizeof u);
+    PFL_LOAD_WORD(u, p);
     return u;
 }
 
 static inline void pfl_store_u32(float *p, uint32_t u)
 {
-    PFL_COPY(PFL_WORD(p), &u, sizeof u);
+    PFL_STORE_WORD(p, u);
 }
 
 static inline bool pfl_is_finite(float x)

@@ -53,21 +53,31 @@ static inline uint32_t height(const comb_t *comb, uint32_t c)
     return (uint32_t)(((uint64_t)c * comb->factor) >> 32);
 }
 
-/* The weights in the scratch column, padded with zeros to full lanes, to integers; sums of particles i mod 8. Their sum
- * misses QUANTA by the rounding of weight_sum, at most N / 8 + 3 steps of 2^-24, and one for each particle: 1 %. */
-static void quantise(pfl_t *f, uint32_t *sums)
+/* Loops over eight lanes at a moving address, a step at a time: so gcc makes vectors of them, and as well as anything of
+ * their unrolled form on a core without. */
+
+/* Weights to integers, padding (zeros) included; adds those of particles i mod 8. */
+PFL_NOINLINE static void quantise_lanes(float *column, const float *end, float scale, uint32_t *sums)
 {
-    const float scale = QUANTA / f->weight_sum;
-    float *restrict column = f->scratch;
-    uint32_t sum[LANES] = {0u, 0u, 0u, 0u, 0u, 0u, 0u, 0u};
-    for (uint32_t i = 0u; i < f->stride; i += LANES) {
+    uint32_t sum[LANES];
+    PFL_COPY(sum, sums, sizeof sum);
+    for (float *at = column; at < end; at += LANES) {
         for (uint32_t l = 0u; l < LANES; l++) {
-            const uint32_t q = (uint32_t)(int32_t)(column[i + l] * scale);
-            pfl_store_u32(&column[i + l], q);
-            sum[l] += q;
+            pfl_store_u32(&at[l], (uint32_t)(int32_t)(at[l] * scale));
+        }
+        for (uint32_t l = 0u; l < LANES; l++) {
+            sum[l] += pfl_load_u32(&at[l]);
         }
     }
     PFL_COPY(sums, sum, sizeof sum);
+}
+
+/* The weights in the scratch column to integers. Their sum misses QUANTA by the rounding of weight_sum, at most
+ * N / 8 + 3 steps of 2^-24, and one for each particle: 1 %. */
+static void quantise(pfl_t *f, uint32_t *sums)
+{
+    memset(sums, 0, sizeof(uint32_t) * LANES);
+    quantise_lanes(f->scratch, &f->scratch[f->stride], QUANTA / f->weight_sum, sums);
 }
 
 static uint32_t total_of(const uint32_t *sums)
@@ -81,41 +91,58 @@ static uint32_t total_of(const uint32_t *sums)
  * vector runs through all lanes at once, each from where the one before ends; without vectors one lane after the other
  * keeps its sum in a register. The same counts either way. */
 #if defined(__SSE2__) || defined(__ARM_NEON)
-static void comb_lanes(pfl_t *f, const comb_t *comb, const uint32_t *sums, uint32_t start)
+PFL_NOINLINE static void comb_vectors(float *column, const float *end, const comb_t *comb, uint32_t start,
+                                      uint32_t *lanes)
 {
     const comb_t c = *comb;
-    float *restrict column = f->scratch;
     uint32_t reach[LANES];
     uint32_t before[LANES];
-    uint32_t sum = 0u;
-    for (uint32_t l = 0u; l < LANES; l++) {
-        reach[l] = sum;
-        before[l] = (height(&c, sum) + start) >> c.shift;
-        sum += sums[l];
-    }
-    for (uint32_t i = 0u; i < f->stride; i += LANES) {
+    PFL_COPY(reach, lanes, sizeof reach);
+    PFL_COPY(before, &lanes[LANES], sizeof before);
+    for (float *at = column; at < end; at += LANES) {
+        uint32_t below[LANES];
         for (uint32_t l = 0u; l < LANES; l++) {
-            reach[l] += pfl_load_u32(&column[i + l]);
-            const uint32_t below = (height(&c, reach[l]) + start) >> c.shift;
-            pfl_store_u32(&column[i + l], below - before[l]);
-            before[l] = below;
+            reach[l] += pfl_load_u32(&at[l]);
+        }
+        for (uint32_t l = 0u; l < LANES; l++) {
+            below[l] = (height(&c, reach[l]) + start) >> c.shift;
+        }
+        for (uint32_t l = 0u; l < LANES; l++) {
+            pfl_store_u32(&at[l], below[l] - before[l]);
+        }
+        for (uint32_t l = 0u; l < LANES; l++) {
+            before[l] = below[l];
         }
     }
+    PFL_COPY(lanes, reach, sizeof reach);
+    PFL_COPY(&lanes[LANES], before, sizeof before);
+}
+
+static void comb_lanes(pfl_t *f, const comb_t *comb, const uint32_t *sums, uint32_t start)
+{
+    uint32_t lanes[2u * LANES]; /* where each lane begins, and the points below that */
+    uint32_t sum = 0u;
+    for (uint32_t l = 0u; l < LANES; l++) {
+        lanes[l] = sum;
+        lanes[LANES + l] = (height(comb, sum) + start) >> comb->shift;
+        sum += sums[l];
+    }
+    comb_vectors(f->scratch, &f->scratch[f->stride], comb, start, lanes);
 }
 #else
 static void comb_lanes(pfl_t *f, const comb_t *comb, const uint32_t *sums, uint32_t start)
 {
     const comb_t c = *comb;
     float *const column = f->scratch;
-    const uint32_t end = f->stride;
+    const float *const end = &f->scratch[f->stride];
     uint32_t reach = 0u;
     uint32_t before = 0u;
     (void)sums;
     for (uint32_t l = 0u; l < LANES; l++) {
-        for (uint32_t i = l; i < end; i += LANES) {
-            reach += pfl_load_u32(&column[i]);
+        for (float *at = &column[l]; at < end; at += LANES) {
+            reach += pfl_load_u32(at);
             const uint32_t below = (height(&c, reach) + start) >> c.shift;
-            pfl_store_u32(&column[i], below - before);
+            pfl_store_u32(at, below - before);
             before = below;
         }
     }
@@ -245,23 +272,45 @@ PFL_NOINLINE static void count_residual(pfl_t *f)
 
 /* ---- Offspring counts to copies --------------------------------------------------------------------------------------- */
 
-/* Slots without offspring, from the front of a column, and parents with more than one, from its end. Particle i finds
- * at most i entries: both stores fit, and where they hit the same place they store the same, so that neither needs a
- * branch. Returns the number of parents. */
-static uint32_t list_moves(pfl_t *f)
+/* n == 0 and n <= 1 as numbers, n < 2^31, as the processor adds them with least effort and no branch. */
+static inline uint32_t is_none(uint32_t n)
 {
-    const uint32_t count = f->config->particles;
-    const float *restrict offspring = f->scratch;
-    float *slot = f->log_weight;
-    float *parent = &f->log_weight[count - 1u];
-    for (uint32_t i = 0u; i < count; i++) {
-        const uint32_t n = pfl_load_u32(&offspring[i]);
-        pfl_store_u32(slot, i);
-        pfl_store_u32(parent, i);
-        slot += (n < 1u) ? 1u : 0u;
-        parent -= (n > 1u) ? 1u : 0u;
+#if defined(__arm__)
+    return (n - 1u) >> 31;
+#else
+    return (uint32_t)(n < 1u);
+#endif
+}
+
+static inline uint32_t is_few(uint32_t n)
+{
+#if defined(__arm__)
+    return (n - 2u) >> 31;
+#else
+    return (uint32_t)((n >> 1) < 1u);
+#endif
+}
+
+/* Slots without offspring, from the front of a list, and parents with more than one, from its end. Particle i finds at
+ * most i entries: both stores fit, and where they hit the same place they store the same, so that neither needs a
+ * branch. Returns the number of parents. */
+PFL_NOINLINE static uint32_t list_moves(const float *restrict offspring, float *restrict list, uint32_t count)
+{
+    float *last = &list[count - 1u]; /* where a parent goes if all before were parents */
+    size_t slots = 0u;
+    size_t others = 0u; /* no parents */
+    for (uint32_t i = 0u; i < count; i += LANES) {
+        for (uint32_t l = 0u; l < LANES; l++) {
+            const uint32_t n = pfl_load_u32(&offspring[l]);
+            pfl_store_u32(&list[slots], i + l);
+            pfl_store_u32(&(last - l)[others], i + l);
+            slots += is_none(n);
+            others += is_few(n);
+        }
+        last -= LANES;
+        offspring += LANES;
     }
-    return (uint32_t)(&f->log_weight[count - 1u] - parent);
+    return count - (uint32_t)others;
 }
 
 /* Writes one state of all parents to the slots of their copies. */
@@ -269,7 +318,7 @@ static void copy_state(const pfl_t *f, float *x, uint32_t parents)
 {
     const float *const offspring = f->scratch;
     const float *slot = f->log_weight;
-    const float *parent = &f->log_weight[f->config->particles];
+    const float *parent = &f->log_weight[f->stride];
     for (uint32_t k = 0u; k < parents; k++) {
         parent--;
         const uint32_t from = pfl_load_u32(parent);
@@ -286,7 +335,7 @@ static void copy_four_states(const pfl_t *f, float *a, uint32_t parents)
 {
     const float *const offspring = f->scratch;
     const float *slot = f->log_weight;
-    const float *parent = &f->log_weight[f->config->particles];
+    const float *parent = &f->log_weight[f->stride];
     float *b = a + f->stride;
     float *c = b + f->stride;
     float *d = c + f->stride;
@@ -310,7 +359,10 @@ static void copy_four_states(const pfl_t *f, float *a, uint32_t parents)
 
 PFL_NOINLINE static void copy_surplus(pfl_t *f)
 {
-    const uint32_t parents = list_moves(f);
+    for (uint32_t i = f->config->particles; i < f->stride; i++) {
+        pfl_store_u32(&f->scratch[i], 1u); /* padding stays as it is */
+    }
+    const uint32_t parents = list_moves(f->scratch, f->log_weight, f->stride);
     uint32_t d = 0u;
     for (; (d + 4u) <= f->config->states; d += 4u) {
         copy_four_states(f, &f->x[(size_t)d * f->stride], parents);
