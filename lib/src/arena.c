@@ -37,9 +37,9 @@ static bool options_are_good(const pfl_config_t *c)
 {
     const pfl_constraint_t *k = c->constraint;
     const pfl_kernel_t *kernel = c->kernel;
-    const bool constraint =
-        (k == NULL) || ((k->inside != NULL) && (k->project != NULL) && (k->tries >= 1u) && (k->tries <= PFL_TRIES_MAX));
-    const bool jitter = (kernel == NULL) || ((c->moments == (uint16_t)PFL_MOMENTS_FULL) &&
+    const bool constraint = (k == NULL) || ((k->inside != NULL) && (k->project != NULL) && (k->keep != NULL) &&
+                                            (k->tries >= 1u) && (k->tries <= PFL_TRIES_MAX));
+    const bool jitter = (kernel == NULL) || ((kernel->move != NULL) && (c->moments == (uint16_t)PFL_MOMENTS_FULL) &&
                                              pfl_is_finite(kernel->width) && (kernel->width > 0.0f) &&
                                              (kernel->width < 1.0f) && ((kernel->states_mask >> c->states) == 0u));
     return constraint && jitter;

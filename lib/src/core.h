@@ -90,13 +90,6 @@ pfl_batch_t pfl_batch_at(pfl_t *f, uint32_t first, uint32_t n);
 uint32_t pfl_count_nonfinite(const pfl_t *f, uint32_t first, uint32_t n);
 pfl_status_t pfl_propagate(pfl_t *f, uint32_t dt_us, const void *u);
 
-/* constraint.c */
-void pfl_constraint_save(pfl_t *f, uint32_t first, uint32_t n);
-void pfl_constrain(pfl_t *f, const void *u, float dt_s, uint32_t first, uint32_t n);
-
-/* kernel.c */
-void pfl_kernel_move(pfl_t *f);
-
 /* filter.c */
 pfl_status_t pfl_draw_prior(pfl_t *f);
 

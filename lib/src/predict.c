@@ -119,24 +119,34 @@ static bool first_group_survives(pfl_t *f, const void *u, float dt_s, uint32_t n
     return survives;
 }
 
+/* For new attempts: what the batch was before its move. */
+static void save_for_retries(pfl_t *f, uint32_t first, uint32_t n)
+{
+    for (uint32_t d = 0u; (f->retry != NULL) && (d < f->config->states); d++) {
+        memcpy(&f->retry[(size_t)d * PFL_BATCH], &f->x[((size_t)d * f->stride) + first], sizeof(float) * n);
+    }
+}
+
 /* One model step for all particles; *lost grows by those quarantined. */
 PFL_NOINLINE static pfl_status_t step(pfl_t *f, const void *u, float dt_s, bool undoable, uint32_t *lost)
 {
     const uint32_t count = f->config->particles;
     uint32_t n = (count < PFL_GROUP) ? count : PFL_GROUP;
     uint32_t first = 0u;
-    pfl_constraint_save(f, first, n);
+    save_for_retries(f, first, n);
     if (undoable && !first_group_survives(f, u, dt_s, n, false)) {
         return PFL_ERR_NONFINITE;
     }
     while (first < count) {
         if (!undoable || (first > 0u)) {
-            pfl_constraint_save(f, first, n);
+            save_for_retries(f, first, n);
             const pfl_batch_t batch = pfl_batch_at(f, first, n);
             pfl_make_noise(f, f->config->noises, n);
             f->config->predict(f->config->user, u, dt_s, &batch);
         }
-        pfl_constrain(f, u, dt_s, first, n);
+        if (f->config->constraint != NULL) {
+            f->config->constraint->keep(f, u, dt_s, first, n);
+        }
         if (batch_is_suspect(f, first, n)) {
             *lost += quarantine(f, first, n);
         }

@@ -398,7 +398,9 @@ void pfl_resample_now(pfl_t *f)
     }
     copy_surplus(f);
     pfl_weights_equal(f);
-    pfl_kernel_move(f);
+    if (f->config->kernel != NULL) {
+        f->config->kernel->move(f);
+    }
     f->scratch_is_weights = 0u;
     f->resample_pending = 0u;
     pfl_count(&f->resampled, 1u);
