@@ -7,6 +7,14 @@
 /* A little more than PFL_LOGLIK_MAX, which itself is legal: what remains of a legal log-likelihood is below zero. */
 #define LOGLIK_SHIFT 0.00097656262f
 
+/* The rest of a group weighs nothing. */
+static void pad(float *log_weight, uint32_t n)
+{
+    for (uint32_t i = 0u; i < n; i++) {
+        log_weight[i] = pfl_from_bits((int32_t)0xFF800000u);
+    }
+}
+
 void pfl_weigh_start(pfl_weigh_t *w)
 {
     w->worst_bits = INT32_MIN;
@@ -32,6 +40,7 @@ void pfl_weigh_batch(const pfl_t *f, uint32_t first, uint32_t n, float *ll, pfl_
         best = (y_bits < best) ? y_bits : best;
         top = (s_bits < top) ? s_bits : top;
     }
+    pad(&ll[n], (uint32_t)PFL_CEIL8(n) - n);
     w->worst_bits = worst;
     w->best_bits = best;
     if (top < w->top_bits) {
@@ -42,9 +51,9 @@ void pfl_weigh_batch(const pfl_t *f, uint32_t first, uint32_t n, float *ll, pfl_
 
 void pfl_weights_equal(pfl_t *f)
 {
-    for (uint32_t i = 0u; i < f->stride; i++) {
-        f->log_weight[i] = 0.0f;
-    }
+    const uint32_t count = f->config->particles;
+    memset(f->log_weight, 0, sizeof(float) * count);
+    pad(&f->log_weight[count], f->stride - count);
     f->log_weight_top = 0.0f;
     f->scratch_is_weights = 0u;
 }
