@@ -23,6 +23,22 @@ static inline float pfl_lane_sum(const float *row)
     return ((row[0] + row[1]) + (row[2] + row[3])) + ((row[4] + row[5]) + (row[6] + row[7]));
 }
 
+/* row += x + y, in any order */
+static inline void pfl_lanes_sum(float *restrict row, const float *restrict x, const float *restrict y, uint32_t n)
+{
+    pfl_part_t *sum = (pfl_part_t *)row;
+    const pfl_part_t *value = (const pfl_part_t *)x;
+    const pfl_part_t *other = (const pfl_part_t *)y;
+    for (uint32_t groups = n / PFL_LANES; groups > 0u; groups--) {
+        for (uint32_t k = 0u; k < PFL_LANE_PARTS; k++) {
+            sum[k] += value[k];
+            sum[k] += other[k];
+        }
+        value += PFL_LANE_PARTS;
+        other += PFL_LANE_PARTS;
+    }
+}
+
 /* row += w (x - centre) */
 static inline void pfl_lanes_product(float *restrict row, const float *restrict w, const float *restrict x,
                                      const float *centre, uint32_t n)

@@ -18,12 +18,14 @@
 #define ROW_PRODUCT(states) (ROW_MEAN + (3u * (states)))
 #define ROW_END(states) (ROW_PRODUCT(states) + (((states) * ((states) + 1u)) / 2u))
 
+#define LONG_PIECE (4u * PFL_BATCH) /* particles; a few columns of as many fit into a first-level cache */
+
 static float *row_at(const pfl_t *f, uint32_t row)
 {
     return f->lanes + ((size_t)row * PFL_LANES);
 }
 
-static float row_sum(const pfl_t *f, uint32_t row)
+PFL_NOINLINE static float row_sum(const pfl_t *f, uint32_t row)
 {
     return pfl_lane_sum(row_at(f, row));
 }
@@ -73,26 +75,29 @@ PFL_NOINLINE static void product_lanes(const pfl_t *f, uint32_t row, const float
     }
 }
 
+/* Sine and cosine of angles about a centre into the first two work columns. */
+PFL_NOINLINE static void circle(float *restrict work, const float *restrict x, float centre, uint32_t n)
+{
+    for (uint32_t i = 0u; i < n; i++) {
+        pfl_sincos_kernel(pfl_wrap_pi_kernel(x[i] - centre), &work[i], &work[PFL_BATCH + i]);
+    }
+}
+
 /* Sums of sine and cosine of the angles, about the most likely particle. */
 PFL_NOINLINE static void circle_lanes(pfl_t *f, uint32_t first, uint32_t n)
 {
     const uint32_t states = f->config->states;
-    float *restrict work = f->work;
-    const columns_t of = {work, PFL_BATCH, 2u, no_centre};
+    const columns_t of = {f->work, PFL_BATCH, 2u, no_centre};
     for (uint32_t d = 0u; d < states; d++) {
         if (is_circular(f, d)) {
-            const float *restrict x = &f->x[((size_t)d * f->stride) + first];
-            const float centre = f->centre[d];
-            for (uint32_t i = 0u; i < n; i++) {
-                pfl_sincos_kernel(pfl_wrap_pi_kernel(x[i] - centre), &work[i], &work[PFL_BATCH + i]);
-            }
+            circle(f->work, &f->x[((size_t)d * f->stride) + first], f->centre[d], n);
             product_lanes(f, ROW_CIRCLE(states) + (2u * d), &f->scratch[first], &of, n);
         }
     }
 }
 
 /* The circular means become the centres of the angles. */
-static void centre_circles(const pfl_t *f)
+PFL_NOINLINE static void centre_circles(const pfl_t *f)
 {
     const uint32_t states = f->config->states;
     for (uint32_t d = 0u; d < states; d++) {
@@ -138,7 +143,7 @@ static void deviations(pfl_t *f, uint32_t d, const float *restrict x, uint32_t n
 }
 
 /* Means and covariance. */
-PFL_NOINLINE static void full_lanes(pfl_t *f, uint32_t first, uint32_t n)
+static void full_lanes(pfl_t *f, uint32_t first, uint32_t n)
 {
     const uint32_t states = f->config->states;
     const float *w = &f->scratch[first];
@@ -158,7 +163,7 @@ PFL_NOINLINE static void full_lanes(pfl_t *f, uint32_t first, uint32_t n)
     }
 }
 
-static void state_lanes(pfl_t *f, uint32_t first, uint32_t n)
+PFL_NOINLINE static void state_lanes(pfl_t *f, uint32_t first, uint32_t n)
 {
     if (is_full(f)) {
         full_lanes(f, first, n);
@@ -220,11 +225,15 @@ void pfl_set_best(pfl_t *f, uint32_t first)
 /* What a pass does with each batch: the padding belongs to the last one. */
 typedef enum { PASS_WEIGHTS = 1, PASS_CIRCLES = 2, PASS_STATES = 4 } pass_t;
 
-/* One sweep over the particles; false when the budget ran out. */
+/* One sweep over the particles; false when the budget ran out. Where neither budget nor work columns ask for batches
+ * longer pieces save some overhead. */
 static bool sweep(pfl_t *f, bool budgeted, uint32_t passes)
 {
-    for (uint32_t first = 0u; first < f->stride; first += PFL_BATCH) {
-        const uint32_t n = ((f->stride - first) < PFL_BATCH) ? (f->stride - first) : PFL_BATCH;
+    const bool in_batches = (f->config->budget_cycles != 0u) || is_full(f) || ((passes & PASS_CIRCLES) != 0u);
+    const uint32_t piece = in_batches ? PFL_BATCH : LONG_PIECE;
+    pfl_weights_settle(f);
+    for (uint32_t first = 0u; first < f->stride; first += piece) {
+        const uint32_t n = ((f->stride - first) < piece) ? (f->stride - first) : piece;
         if (budgeted && pfl_meter_spent(f)) {
             return false;
         }
