@@ -22,6 +22,18 @@
 #define PFL_COPY(to, from, bytes) ((void)memcpy((to), (from), (bytes)))
 #endif
 
+/* Floats in a vector register of the target; 1: it has none that rounds as IEEE 754 says, and scalar forms are the
+ * faster ones. Both forms of a kernel give the same bits (test_lanes.c). */
+#if !defined(PFL_VECTOR_LANES)
+#if defined(__GNUC__) && defined(__AVX__)
+#define PFL_VECTOR_LANES 8
+#elif defined(__GNUC__) && (defined(__SSE2__) || (defined(__aarch64__) && defined(__ARM_NEON)))
+#define PFL_VECTOR_LANES 4
+#else
+#define PFL_VECTOR_LANES 1
+#endif
+#endif
+
 static inline int32_t pfl_bits(float x)
 {
     int32_t i;

@@ -5,7 +5,9 @@
  * update writes the new log-weights to the other weight column ("scratch") and commits by exchanging the two pointers,
  * so a refused update leaves no trace. Every log-likelihood is taken less a little more than PFL_LOGLIK_MAX first: a
  * legal one is then strictly negative, NaN and positive ones stand out in a single integer comparison, and the order of
- * negative floats is the reverse order of their bits. */
+ * negative floats is the reverse order of their bits. Equal weights, which every resampling leaves, are a flag: an
+ * update need not read a column of zeros. The columns are padded to a multiple of eight with particles that weigh
+ * nothing: log-weights of minus infinity. */
 #ifndef PFL_CORE_H
 #define PFL_CORE_H
 
@@ -60,6 +62,7 @@ struct pfl {
     float weight_sum; /* of the weights that `scratch` holds, if it does */
     float test_ratio;
     float ess;
+    uint32_t weights_equal;      /* every log-weight is 0, whatever the column holds */
     uint32_t scratch_is_weights; /* scratch[i] = weight i, current */
     uint32_t moments_current;    /* mean, cov belong to the filter's time: MOMENTS_ */
     uint32_t resample_pending;   /* put off by the budget */
@@ -95,14 +98,16 @@ pfl_status_t pfl_draw_prior(pfl_t *f);
 
 /* weights.c: the two passes of an update */
 typedef struct {
+    uint32_t gated;     /* the best log-likelihood is wanted */
     int32_t worst_bits; /* largest bits of any log-likelihood: tells a NaN or a positive one */
     int32_t best_bits;  /* smallest: the best log-likelihood */
     int32_t top_bits;   /* smallest bits of the new log-weights: the largest log-weight */
     uint32_t top_first; /* batch that holds it */
 } pfl_weigh_t;
-void pfl_weigh_start(pfl_weigh_t *w);
+void pfl_weigh_start(pfl_weigh_t *w, bool gated);
 void pfl_weigh_batch(const pfl_t *f, uint32_t first, uint32_t n, float *ll, pfl_weigh_t *w);
 void pfl_weights_equal(pfl_t *f);
+void pfl_weights_settle(pfl_t *f); /* before the column of log-weights is read or changed: it holds them from now on */
 void pfl_weights_after_loss(pfl_t *f); /* some particles lost theirs: a new top, or equal ones if none is left */
 
 /* moments.c */

@@ -95,7 +95,7 @@ PFL_NOINLINE static pfl_status_t weigh(pfl_t *f, const pfl_sensor_t *sensor, con
 {
     const uint32_t count = f->config->particles;
     void *user = (sensor->user != NULL) ? sensor->user : f->config->user;
-    pfl_weigh_start(w);
+    pfl_weigh_start(w, sensor->gate > 0.0f);
     f->scratch_is_weights = 0u;
     for (uint32_t first = 0u; first < count; first += PFL_BATCH) {
         const uint32_t n = ((count - first) < PFL_BATCH) ? (count - first) : PFL_BATCH;
@@ -139,6 +139,7 @@ static void commit(pfl_t *f, const pfl_weigh_t *w)
     float *old = f->log_weight;
     f->log_weight = f->scratch;
     f->scratch = old;
+    f->weights_equal = 0u;
     f->log_weight_top = pfl_from_bits(w->top_bits);
     pfl_count(&f->fused, 1u);
     f->t_fused_us = f->t_us;

@@ -2,6 +2,8 @@
  * happens to particles that come out non-finite or outside their box. */
 #include "core.h"
 
+#include "lanes.h"
+
 /* ---- Particles that are not finite ---------------------------------------------------------------------------- */
 
 static bool particle_is_finite(const pfl_t *f, uint32_t i)
@@ -22,26 +24,26 @@ uint32_t pfl_count_nonfinite(const pfl_t *f, uint32_t first, uint32_t n)
     return found;
 }
 
-/* One addition a value: a NaN or an infinity anywhere in the batch stays in the sum. */
+/* One addition a value: a NaN or an infinity anywhere in the batch stays in the sum. A last column without a neighbour
+ * is added twice. */
 PFL_NOINLINE static bool batch_is_suspect(const pfl_t *f, uint32_t first, uint32_t n)
 {
-    float sum[8] = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
-    for (uint32_t d = 0u; d < f->config->states; d++) {
-        const float *x = &f->x[((size_t)d * f->stride) + first];
-        for (uint32_t i = 0u; i < n; i += 8u) {
-            for (uint32_t l = 0u; l < 8u; l++) {
-                sum[l] += x[i + l];
-            }
-        }
+    const uint32_t last = f->config->states - 1u;
+    const float *x = &f->x[first];
+    float row[PFL_LANES] = {0.0f};
+    for (uint32_t d = 0u; d <= last; d += 2u) {
+        const float *y = (d < last) ? (x + f->stride) : x;
+        pfl_lanes_sum(row, x, y, (uint32_t)PFL_CEIL8(n));
+        x = y + f->stride;
     }
-    const float all = ((sum[0] + sum[1]) + (sum[2] + sum[3])) + ((sum[4] + sum[5]) + (sum[6] + sum[7]));
-    return !pfl_is_finite(all);
+    return !pfl_is_finite(pfl_lane_sum(row));
 }
 
 /* Non-finite particles take the state of the most likely one, which is finite, and lose their weight. */
 PFL_NOINLINE static uint32_t quarantine(pfl_t *f, uint32_t first, uint32_t n)
 {
     uint32_t found = 0u;
+    pfl_weights_settle(f);
     for (uint32_t i = first; i < (first + n); i++) {
         if (!particle_is_finite(f, i)) {
             for (uint32_t d = 0u; d < f->config->states; d++) {
@@ -131,6 +133,7 @@ static void save_for_retries(pfl_t *f, uint32_t first, uint32_t n)
 PFL_NOINLINE static pfl_status_t step(pfl_t *f, const void *u, float dt_s, bool undoable, uint32_t *lost)
 {
     const uint32_t count = f->config->particles;
+    const bool constrained = f->config->constraint != NULL;
     uint32_t n = (count < PFL_GROUP) ? count : PFL_GROUP;
     uint32_t first = 0u;
     save_for_retries(f, first, n);
@@ -144,7 +147,7 @@ PFL_NOINLINE static pfl_status_t step(pfl_t *f, const void *u, float dt_s, bool 
             pfl_make_noise(f, f->config->noises, n);
             f->config->predict(f->config->user, u, dt_s, &batch);
         }
-        if (f->config->constraint != NULL) {
+        if (constrained) {
             f->config->constraint->keep(f, u, dt_s, first, n);
         }
         if (batch_is_suspect(f, first, n)) {
