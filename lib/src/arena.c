@@ -39,9 +39,9 @@ static bool watch_is_good(const pfl_config_t *c)
     if (w == NULL) {
         return true;
     }
-    bool good = pfl_is_finite(w->lean_ratio) && (w->lean_ratio >= 0.0f) && (w->lean_ratio <= 1.0f) &&
-                pfl_is_finite(w->reinject) && (w->reinject >= 0.0f) && (w->reinject <= 1.0f) &&
-                ((w->ok_sigma == NULL) || (c->moments == (uint16_t)PFL_MOMENTS_FULL));
+    bool good = (w->keep != NULL) && pfl_is_finite(w->lean_ratio) && (w->lean_ratio >= 0.0f) &&
+                (w->lean_ratio <= 1.0f) && pfl_is_finite(w->reinject) && (w->reinject >= 0.0f) &&
+                (w->reinject <= 1.0f) && ((w->ok_sigma == NULL) || (c->moments == (uint16_t)PFL_MOMENTS_FULL));
     for (uint32_t d = 0u; (w->ok_sigma != NULL) && (d < c->states); d++) {
         good = good && pfl_is_not_nan(w->ok_sigma[d]) && (w->ok_sigma[d] > 0.0f);
     }
@@ -52,9 +52,9 @@ static bool options_are_good(const pfl_config_t *c)
 {
     const pfl_constraint_t *k = c->constraint;
     const pfl_kernel_t *kernel = c->kernel;
-    const bool constraint =
-        (k == NULL) || ((k->inside != NULL) && (k->project != NULL) && (k->tries >= 1u) && (k->tries <= PFL_TRIES_MAX));
-    const bool jitter = (kernel == NULL) || ((c->moments == (uint16_t)PFL_MOMENTS_FULL) &&
+    const bool constraint = (k == NULL) || ((k->inside != NULL) && (k->project != NULL) && (k->keep != NULL) &&
+                                            (k->tries >= 1u) && (k->tries <= PFL_TRIES_MAX));
+    const bool jitter = (kernel == NULL) || ((kernel->move != NULL) && (c->moments == (uint16_t)PFL_MOMENTS_FULL) &&
                                              pfl_is_finite(kernel->width) && (kernel->width > 0.0f) &&
                                              (kernel->width < 1.0f) && ((kernel->states_mask >> c->states) == 0u));
     return constraint && jitter && watch_is_good(c);

@@ -22,6 +22,18 @@
 #define PFL_COPY(to, from, bytes) ((void)memcpy((to), (from), (bytes)))
 #endif
 
+/* Floats in a vector register of the target; 1: it has none that rounds as IEEE 754 says, and scalar forms are the
+ * faster ones. Both forms of a kernel give the same bits (test_lanes.c). */
+#if !defined(PFL_VECTOR_LANES)
+#if defined(__GNUC__) && defined(__AVX__)
+#define PFL_VECTOR_LANES 8
+#elif defined(__GNUC__) && (defined(__SSE2__) || (defined(__aarch64__) && defined(__ARM_NEON)))
+#define PFL_VECTOR_LANES 4
+#else
+#define PFL_VECTOR_LANES 1
+#endif
+#endif
+
 static inline int32_t pfl_bits(float x)
 {
     int32_t i;
@@ -36,16 +48,27 @@ static inline float pfl_from_bits(int32_t i)
     return x;
 }
 
+/* The word at the address of a float. A copy is not known to be aligned there: a core that cannot load across words
+ * would go byte by byte. */
+#if defined(__GNUC__)
+typedef uint32_t pfl_word_t __attribute__((__may_alias__));
+#define PFL_LOAD_WORD(u, p) ((u) = *(const pfl_word_t *)(p))
+#define PFL_STORE_WORD(p, u) (*(pfl_word_t *)(p) = (u))
+#else
+#define PFL_LOAD_WORD(u, p) ((void)memcpy(&(u), (p), sizeof(uint32_t)))
+#define PFL_STORE_WORD(p, u) ((void)memcpy((p), &(u), sizeof(uint32_t)))
+#endif
+
 static inline uint32_t pfl_load_u32(const float *p)
 {
     uint32_t u;
-    PFL_COPY(&u, p, sizeof u);
+    PFL_LOAD_WORD(u, p);
     return u;
 }
 
 static inline void pfl_store_u32(float *p, uint32_t u)
 {
-    PFL_COPY(p, &u, sizeof u);
+    PFL_STORE_WORD(p, u);
 }
 
 static inline bool pfl_is_finite(float x)

@@ -1,6 +1,6 @@
 /* State constraints: bounded acceptance-rejection, then projection. filter.h tells the rule.
  *
- * With retries a batch is kept as it was before its move. Those that landed outside are gathered from there, close
+ * With retries predict.c keeps a batch as it was before its move. Those that landed outside are gathered from there, close
  * together, moved again with new noise, and those that are inside now go back to their places. */
 #include "core.h"
 
@@ -13,13 +13,6 @@ static uint32_t *flags_of(pfl_t *f)
 static void *user_of(const pfl_t *f)
 {
     return (f->config->constraint->user != NULL) ? f->config->constraint->user : f->config->user;
-}
-
-void pfl_constraint_save(pfl_t *f, uint32_t first, uint32_t n)
-{
-    for (uint32_t d = 0u; (f->retry != NULL) && (d < f->config->states); d++) {
-        memcpy(&f->retry[(size_t)d * PFL_BATCH], &f->x[((size_t)d * f->stride) + first], sizeof(float) * n);
-    }
 }
 
 /* Places (0 .. n-1) of particles outside, in order; returns how many. */
@@ -63,12 +56,9 @@ static void try_again(pfl_t *f, const void *u, float dt_s, uint32_t first, uint3
     }
 }
 
-void pfl_constrain(pfl_t *f, const void *u, float dt_s, uint32_t first, uint32_t n)
+void pfl_constraint_keep(pfl_t *f, const void *u, float dt_s, uint32_t first, uint32_t n)
 {
     const pfl_constraint_t *constraint = f->config->constraint;
-    if (constraint == NULL) {
-        return;
-    }
     uint32_t outside = list_outside(f, first, n);
     for (uint32_t draw = 1u; (outside > 0u) && (draw < constraint->tries); draw++) {
         try_again(f, u, dt_s, first, outside);

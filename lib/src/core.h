@@ -5,7 +5,9 @@
  * update writes the new log-weights to the other weight column ("scratch") and commits by exchanging the two pointers,
  * so a refused update leaves no trace. Every log-likelihood is taken less a little more than PFL_LOGLIK_MAX first: a
  * legal one is then strictly negative, NaN and positive ones stand out in a single integer comparison, and the order of
- * negative floats is the reverse order of their bits. */
+ * negative floats is the reverse order of their bits. Equal weights, which every resampling leaves, are a flag: an
+ * update need not read a column of zeros. The columns are padded to a multiple of eight with particles that weigh
+ * nothing: log-weights of minus infinity. */
 #ifndef PFL_CORE_H
 #define PFL_CORE_H
 
@@ -92,6 +94,7 @@ struct pfl {
     float weight_sum; /* of the weights that `scratch` holds, if it does */
     float test_ratio;
     float ess;
+    uint32_t weights_equal;      /* every log-weight is 0, whatever the column holds */
     uint32_t scratch_is_weights; /* scratch[i] = weight i, current */
     uint32_t moments_current;    /* mean, cov belong to the filter's time: MOMENTS_ */
     uint32_t resample_pending;   /* put off by the budget */
@@ -127,26 +130,21 @@ pfl_batch_t pfl_batch_at(pfl_t *f, uint32_t first, uint32_t n);
 uint32_t pfl_count_nonfinite(const pfl_t *f, uint32_t first, uint32_t n);
 pfl_status_t pfl_propagate(pfl_t *f, uint32_t dt_us, const void *u);
 
-/* constraint.c */
-void pfl_constraint_save(pfl_t *f, uint32_t first, uint32_t n);
-void pfl_constrain(pfl_t *f, const void *u, float dt_s, uint32_t first, uint32_t n);
-
-/* kernel.c */
-void pfl_kernel_move(pfl_t *f);
-
 /* filter.c */
 pfl_status_t pfl_draw_prior(pfl_t *f);
 
 /* weights.c: the two passes of an update */
 typedef struct {
+    uint32_t gated;     /* the best log-likelihood is wanted */
     int32_t worst_bits; /* largest bits of any log-likelihood: tells a NaN or a positive one */
     int32_t best_bits;  /* smallest: the best log-likelihood */
     int32_t top_bits;   /* smallest bits of the new log-weights: the largest log-weight */
     uint32_t top_first; /* batch that holds it */
 } pfl_weigh_t;
-void pfl_weigh_start(pfl_weigh_t *w);
+void pfl_weigh_start(pfl_weigh_t *w, bool gated);
 void pfl_weigh_batch(const pfl_t *f, uint32_t first, uint32_t n, float *ll, pfl_weigh_t *w);
 void pfl_weights_equal(pfl_t *f);
+void pfl_weights_settle(pfl_t *f); /* before the column of log-weights is read or changed: it holds them from now on */
 void pfl_weights_after_loss(pfl_t *f); /* some particles lost theirs: a new top, or equal ones if none is left */
 
 /* moments.c */
@@ -160,21 +158,28 @@ void pfl_weights(pfl_t *f); /* only the weights, into the scratch column, where 
 void pfl_resample_now(pfl_t *f);
 bool pfl_resample_is_due(const pfl_t *f);
 
-/* watch.c */
-void pfl_watch_start(pfl_t *f);
-void pfl_watch_cycle(pfl_t *f);                       /* a filter cycle begins */
-void pfl_watch_moved(pfl_t *f, uint32_t quarantined); /* a predict ended */
-void pfl_watch_fused(pfl_t *f, uint16_t sensor);
-void pfl_watch_refused(pfl_t *f, uint16_t sensor);
-void pfl_watch_reset(pfl_t *f, uint32_t event);                           /* event: PFL_EVENT_RESET or _REINJECTED */
-pfl_status_t pfl_watch_content(pfl_t *f, uint16_t sensor, const void *z); /* refuses what stands still or comes twice */
-float pfl_worst_ratio(const pfl_t *f);
+/* watch.c, by way of the configuration: what it is told */
+typedef enum {
+    WATCH_ADMIT,   /* is measurement z of sensor `number` news? PFL_OK, PFL_ERR_TIME, PFL_REJECTED */
+    WATCH_MOVED,   /* a predict ended, `number` particles quarantined */
+    WATCH_FUSED,   /* a measurement of sensor `number` */
+    WATCH_REFUSED, /* z of sensor `number` */
+    WATCH_RESET    /* or reinjected */
+} pfl_watch_call_t;
+
+static inline pfl_status_t pfl_watch_tell(pfl_t *f, pfl_watch_call_t what, uint32_t number, const void *z)
+{
+    return (f->config->watch != NULL) ? f->config->watch->keep(f, (uint32_t)what, number, z) : PFL_OK;
+}
+
+/* health.c */
+float pfl_worst_ratio(const pfl_t *f); /* of the sensors' test ratios */
 
 /* scrub.c */
 bool pfl_revive_random(pfl_t *f); /* seeds dead streams anew; true when there were such */
 
 /* reset.c */
-void pfl_reinject(pfl_t *f, uint16_t sensor, const void *z);
+void pfl_reinject(pfl_t *f, uint32_t sensor, const void *z);
 
 /* meter.c */
 void pfl_meter_begin(pfl_t *f);    /* of a filter cycle */

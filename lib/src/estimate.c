@@ -63,7 +63,7 @@ pfl_status_t pfl_particles(const pfl_t *f, pfl_view_t *view, float *log_weights)
     const pfl_view_t all = {f->x, f->stride, 0u, f->config->particles};
     *view = all;
     for (uint32_t i = 0u; (log_weights != NULL) && (i < all.n); i++) {
-        log_weights[i] = f->log_weight[i] - f->log_weight_top;
+        log_weights[i] = (f->weights_equal != 0u) ? 0.0f : (f->log_weight[i] - f->log_weight_top);
     }
     return PFL_OK;
 }
@@ -167,7 +167,7 @@ bool pfl_invariants_hold(const pfl_t *f)
             hold = hold && pfl_is_finite(x[i]);
         }
     }
-    for (uint32_t i = 0u; i < count; i++) {
+    for (uint32_t i = 0u; (f->weights_equal == 0u) && (i < count); i++) {
         const float relative = f->log_weight[i] - f->log_weight_top;
         hold = hold && (relative <= 0.0f) && pfl_is_not_nan(relative);
     }

@@ -32,6 +32,16 @@ pfl_status_t pfl_draw_prior(pfl_t *f)
     return PFL_OK;
 }
 
+/* A sensor is not late before its first timeout, and a budget needs a counter. */
+static void start_watch(pfl_t *f)
+{
+    for (uint32_t k = 0u; (f->sensor != NULL) && (k < f->config->sensor_count); k++) {
+        f->sensor[k].t_fused_us = f->t_us;
+    }
+    const bool blind = (f->config->budget_cycles != 0u) && (f->meter.mask == 0u);
+    f->watched.fault = blind ? PFL_FAULT_PORT : 0u;
+}
+
 pfl_status_t pfl_init(void *arena, size_t arena_bytes, const pfl_config_t *config, uint64_t t_us, pfl_t **out)
 {
     if (out == NULL) {
@@ -56,7 +66,7 @@ pfl_status_t pfl_init(void *arena, size_t arena_bytes, const pfl_config_t *confi
     f->t_fused_us = t_us;
     f->meter.mask = pfl_port_self_test() ? pfl_port_cycles_mask() : 0u;
     pfl_rng_seed(&f->rng, config->seed);
-    pfl_watch_start(f);
+    start_watch(f);
     pfl_guard_start(f);
     pfl_status_t status = pfl_draw_prior(f);
     if (status == PFL_OK) {
@@ -89,14 +99,18 @@ static pfl_status_t predict(pfl_t *f, uint64_t t_us, const void *u)
     if ((t_us - f->t_us) > UINT32_MAX) {
         return misfit(f, PFL_ERR_GAP);
     }
-    pfl_watch_cycle(f);
+    f->watched.fault &= PFL_FAULT_PORT;
+    f->watched.event = 0u;
+    f->watched.quarantined = 0u;
     (void)pfl_revive_random(f);
     pfl_meter_begin(f);
     pfl_meter_resume(f);
     const uint32_t before = f->quarantined;
     const pfl_status_t status = pfl_propagate(f, (uint32_t)(t_us - f->t_us), u);
+    const uint32_t lost = f->quarantined - before;
     pfl_meter_pause(f);
-    pfl_watch_moved(f, f->quarantined - before);
+    f->watched.event |= (lost != 0u) ? PFL_EVENT_QUARANTINED : 0u;
+    (void)pfl_watch_tell(f, WATCH_MOVED, lost, NULL);
     return status;
 }
 
@@ -113,7 +127,7 @@ PFL_NOINLINE static pfl_status_t weigh(pfl_t *f, const pfl_sensor_t *sensor, con
 {
     const uint32_t count = f->config->particles;
     void *user = (sensor->user != NULL) ? sensor->user : f->config->user;
-    pfl_weigh_start(w);
+    pfl_weigh_start(w, sensor->gate > 0.0f);
     f->scratch_is_weights = 0u;
     for (uint32_t first = 0u; first < count; first += PFL_BATCH) {
         const uint32_t n = ((count - first) < PFL_BATCH) ? (count - first) : PFL_BATCH;
@@ -147,7 +161,6 @@ PFL_NOINLINE static pfl_status_t judge(pfl_t *f, const pfl_sensor_t *sensor, con
         f->test_ratio = 0.0f;
     }
     if ((f->test_ratio > 1.0f) || (w->top_bits >= minus_infinity)) {
-        pfl_count(&f->rejected, 1u);
         return PFL_REJECTED;
     }
     return PFL_OK;
@@ -159,10 +172,18 @@ static void commit(pfl_t *f, const pfl_weigh_t *w)
     float *old = f->log_weight;
     f->log_weight = f->scratch;
     f->scratch = old;
+    f->weights_equal = 0u;
     f->log_weight_top = pfl_from_bits(w->top_bits);
     pfl_count(&f->fused, 1u);
     f->t_fused_us = f->t_us;
     pfl_set_best(f, w->top_first);
+}
+
+static pfl_status_t put_off(pfl_t *f)
+{
+    f->resample_pending = 1u;
+    f->watched.event |= PFL_EVENT_DEFERRED;
+    return PFL_DEFERRED;
 }
 
 static pfl_status_t fuse(pfl_t *f, const pfl_sensor_t *sensor, const void *z)
@@ -178,25 +199,15 @@ static pfl_status_t fuse(pfl_t *f, const pfl_sensor_t *sensor, const void *z)
     }
     commit(f, &w);
     if (!pfl_moments(f, true)) {
-        f->resample_pending = 1u;
-        return PFL_DEFERRED;
+        return put_off(f);
     }
     if (pfl_resample_is_due(f)) {
         if (pfl_meter_spent(f)) {
-            f->resample_pending = 1u;
-            return PFL_DEFERRED;
+            return put_off(f);
         }
         pfl_resample_now(f);
     }
     return PFL_OK;
-}
-
-/* The sensor hangs: what it says again and again is no news. */
-static pfl_status_t refuse_frozen(pfl_t *f)
-{
-    f->watched.event |= PFL_EVENT_FROZEN;
-    pfl_count(&f->rejected, 1u);
-    return PFL_REJECTED;
 }
 
 static pfl_status_t update(pfl_t *f, uint16_t sensor, uint64_t t_us, const void *z)
@@ -207,18 +218,20 @@ static pfl_status_t update(pfl_t *f, uint16_t sensor, uint64_t t_us, const void 
     if (sensor >= f->config->sensor_count) {
         return PFL_ERR_SENSOR;
     }
-    const pfl_status_t content = (t_us == f->t_us) ? pfl_watch_content(f, sensor, z) : PFL_ERR_TIME;
-    if (content == PFL_ERR_TIME) {
-        return misfit(f, content);
+    const pfl_status_t news = (t_us == f->t_us) ? pfl_watch_tell(f, WATCH_ADMIT, sensor, z) : PFL_ERR_TIME;
+    if (news == PFL_ERR_TIME) {
+        return misfit(f, news);
     }
     pfl_meter_resume(f);
-    const pfl_status_t status = (content == PFL_OK) ? fuse(f, &f->config->sensors[sensor], z) : refuse_frozen(f);
+    const pfl_status_t status = (news == PFL_OK) ? fuse(f, &f->config->sensors[sensor], z) : news;
     if (status >= PFL_OK) {
-        pfl_watch_fused(f, sensor);
+        f->watched.reject &= ~(1u << sensor);
+        (void)pfl_watch_tell(f, WATCH_FUSED, sensor, z);
     }
     if (status == PFL_REJECTED) {
-        pfl_watch_refused(f, sensor);
-        pfl_reinject(f, sensor, z);
+        pfl_count(&f->rejected, 1u);
+        f->watched.reject |= 1u << sensor;
+        (void)pfl_watch_tell(f, WATCH_REFUSED, sensor, z);
     }
     pfl_meter_pause(f);
     return status;

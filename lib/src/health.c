@@ -8,6 +8,16 @@ static uint32_t mode_of(const pfl_t *f)
     return f->watched.mode | ((f->resample_pending != 0u) ? PFL_MODE_PENDING : 0u);
 }
 
+float pfl_worst_ratio(const pfl_t *f)
+{
+    float worst = f->test_ratio;
+    for (uint32_t k = 0u; (f->sensor != NULL) && (k < f->config->sensor_count); k++) {
+        worst = (f->sensor[k].test_ratio > worst) ? f->sensor[k].test_ratio : worst;
+    }
+    const bool settling = f->watched.phase == (uint32_t)PFL_PHASE_SETTLING;
+    return (settling && (worst < f->watched.ratio_before)) ? f->watched.ratio_before : worst;
+}
+
 pfl_status_t pfl_health(const pfl_t *f, pfl_health_t *out)
 {
     if ((f == NULL) || (out == NULL)) {

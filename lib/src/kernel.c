@@ -65,9 +65,6 @@ PFL_NOINLINE static void move_state(pfl_t *f, uint32_t d, uint32_t first, uint32
 void pfl_kernel_move(pfl_t *f)
 {
     const uint32_t count = f->config->particles;
-    if (f->config->kernel == NULL) {
-        return;
-    }
     pfl_cloud_moments(f, f->kernel_mean, f->kernel_cov);
     root_in_place(f, f->kernel_cov);
     for (uint32_t first = 0u; first < count; first += PFL_BATCH) {

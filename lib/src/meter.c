@@ -47,6 +47,7 @@ bool pfl_meter_is_over(pfl_t *f)
     if (f->overrun_counted == 0u) {
         f->overrun_counted = 1u;
         pfl_count(&f->overruns, 1u);
+        f->watched.event |= PFL_EVENT_OVERRUN;
     }
     return true;
 }

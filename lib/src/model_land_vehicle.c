@@ -3,34 +3,56 @@
 
 #include "math_kernels.h"
 
-#include "pflight/math.h"
+/* What a step is for every particle, and the noise of both positions. */
+typedef struct {
+    float dt_s;
+    float push;   /* engine power over mass */
+    float drag;   /* per speed squared */
+    float turn;   /* heading per speed */
+    float spread; /* position per unit of noise */
+    float speed_min_mps;
+    const float *w_east;
+    const float *w_north;
+} step_t;
+
+/* The columns are parameters: as such, gcc believes `restrict` and leaves out its checks for overlap, which cost a
+ * batch as much as its particles. */
+static void move(const step_t *step, uint32_t n, float *restrict east, float *restrict north, float *restrict speed,
+                 float *restrict heading)
+{
+    const step_t k = *step;
+    for (uint32_t i = 0u; i < n; i++) {
+        float to_east;
+        float to_north;
+        const float v = speed[i];
+        pfl_way_kernel(k.dt_s * v, heading[i], &to_east, &to_north);
+        east[i] += to_east + (k.spread * k.w_east[i]);
+        north[i] += to_north + (k.spread * k.w_north[i]);
+        heading[i] += k.turn * v;
+        speed[i] = v + ((k.push / ((v > k.speed_min_mps) ? v : k.speed_min_mps)) - (k.drag * (v * v)));
+    }
+}
 
 void pfl_land_vehicle_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p)
 {
     const pfl_land_vehicle_t *m = (const pfl_land_vehicle_t *)user;
     const pfl_land_input_t *in = (const pfl_land_input_t *)u;
-    const float push = m->power_w * in->throttle * (dt_s / m->mass_kg);
-    const float drag = m->drag_area_m2 * (dt_s / m->mass_kg);
-    const float turn = dt_s * (pfl_tanf(in->steer_rad) / m->wheelbase_m);
-    const float spread = dt_s * m->sigma_position_mps;
-    const float slowest = m->speed_min_mps;
-    float *restrict east = PFL_STATE(p, PFL_LAND_EAST);
-    float *restrict north = PFL_STATE(p, PFL_LAND_NORTH);
-    float *restrict speed = PFL_STATE(p, PFL_LAND_SPEED);
-    float *restrict heading = PFL_STATE(p, PFL_LAND_HEADING);
-    const float *restrict w_east = PFL_NOISE(p, 0);
-    const float *restrict w_north = PFL_NOISE(p, 1);
-    for (uint32_t i = 0u; i < p->n; i++) {
-        float s;
-        float c;
-        const float v = speed[i];
-        const float way = dt_s * v;
-        pfl_sincos_kernel(heading[i], &s, &c);
-        east[i] += (way * c) + (spread * w_east[i]);
-        north[i] += (way * s) + (spread * w_north[i]);
-        heading[i] += turn * v;
-        speed[i] = v + ((push / ((v > slowest) ? v : slowest)) - (drag * (v * v)));
-    }
+    float ahead;
+    float across;
+    pfl_way_kernel(1.0f, in->steer_rad, &ahead, &across);
+    const float per_mass = dt_s / m->mass_kg;
+    const step_t step = {
+        .dt_s = dt_s,
+        .push = m->power_w * in->throttle * per_mass,
+        .drag = m->drag_area_m2 * per_mass,
+        .turn = (dt_s * across) / (ahead * m->wheelbase_m),
+        .spread = dt_s * m->sigma_position_mps,
+        .speed_min_mps = m->speed_min_mps,
+        .w_east = PFL_NOISE(p, 0),
+        .w_north = PFL_NOISE(p, 1),
+    };
+    move(&step, p->n, PFL_STATE(p, PFL_LAND_EAST), PFL_STATE(p, PFL_LAND_NORTH), PFL_STATE(p, PFL_LAND_SPEED),
+         PFL_STATE(p, PFL_LAND_HEADING));
 }
 
 void pfl_land_vehicle_jitter_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p)

@@ -2,6 +2,8 @@
  * happens to particles that come out non-finite or outside their box. */
 #include "guard.h"
 
+#include "lanes.h"
+
 /* ---- Particles that are not finite ---------------------------------------------------------------------------- */
 
 static bool particle_is_finite(const pfl_t *f, uint32_t i)
@@ -22,26 +24,26 @@ uint32_t pfl_count_nonfinite(const pfl_t *f, uint32_t first, uint32_t n)
     return found;
 }
 
-/* One addition a value: a NaN or an infinity anywhere in the batch stays in the sum. */
+/* One addition a value: a NaN or an infinity anywhere in the batch stays in the sum. A last column without a neighbour
+ * is added twice. */
 PFL_NOINLINE static bool batch_is_suspect(const pfl_t *f, uint32_t first, uint32_t n)
 {
-    float sum[8] = {0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f, 0.0f};
-    for (uint32_t d = 0u; d < f->config->states; d++) {
-        const float *x = &f->x[((size_t)d * f->stride) + first];
-        for (uint32_t i = 0u; i < n; i += 8u) {
-            for (uint32_t l = 0u; l < 8u; l++) {
-                sum[l] += x[i + l];
-            }
-        }
+    const uint32_t last = f->config->states - 1u;
+    const float *x = &f->x[first];
+    float row[PFL_LANES] = {0.0f};
+    for (uint32_t d = 0u; d <= last; d += 2u) {
+        const float *y = (d < last) ? (x + f->stride) : x;
+        pfl_lanes_sum(row, x, y, (uint32_t)PFL_CEIL8(n));
+        x = y + f->stride;
     }
-    const float all = ((sum[0] + sum[1]) + (sum[2] + sum[3])) + ((sum[4] + sum[5]) + (sum[6] + sum[7]));
-    return !pfl_is_finite(all);
+    return !pfl_is_finite(pfl_lane_sum(row));
 }
 
 /* Non-finite particles take the state of the most likely one, which is finite, and lose their weight. */
 PFL_NOINLINE uint32_t pfl_quarantine(pfl_t *f, uint32_t first, uint32_t n)
 {
     uint32_t found = 0u;
+    pfl_weights_settle(f);
     for (uint32_t i = first; i < (first + n); i++) {
         if (!particle_is_finite(f, i)) {
             for (uint32_t d = 0u; d < f->config->states; d++) {
@@ -120,25 +122,36 @@ static bool first_group_survives(pfl_t *f, const void *u, float dt_s, uint32_t n
     return survives;
 }
 
+/* For new attempts: what the batch was before its move. */
+static void save_for_retries(pfl_t *f, uint32_t first, uint32_t n)
+{
+    for (uint32_t d = 0u; (f->retry != NULL) && (d < f->config->states); d++) {
+        memcpy(&f->retry[(size_t)d * PFL_BATCH], &f->x[((size_t)d * f->stride) + first], sizeof(float) * n);
+    }
+}
+
 /* One model step for all particles; *lost grows by those quarantined. */
 PFL_NOINLINE static pfl_status_t step(pfl_t *f, const void *u, float dt_s, bool undoable, uint32_t *lost)
 {
     const uint32_t count = f->config->particles;
+    const bool constrained = f->config->constraint != NULL;
     uint32_t n = (count < PFL_GROUP) ? count : PFL_GROUP;
     uint32_t first = 0u;
-    pfl_constraint_save(f, first, n);
+    save_for_retries(f, first, n);
     if (undoable && !first_group_survives(f, u, dt_s, n, false)) {
         return PFL_ERR_NONFINITE;
     }
     while (first < count) {
         if (!undoable || (first > 0u)) {
-            pfl_constraint_save(f, first, n);
+            save_for_retries(f, first, n);
             const pfl_batch_t batch = pfl_batch_at(f, first, n);
             pfl_make_noise(f, f->config->noises, n);
             f->config->predict(f->config->user, u, dt_s, &batch);
             pfl_guard_after_callback(f);
         }
-        pfl_constrain(f, u, dt_s, first, n);
+        if (constrained) {
+            f->config->constraint->keep(f, u, dt_s, first, n);
+        }
         if (batch_is_suspect(f, first, n)) {
             *lost += pfl_quarantine(f, first, n);
         }

@@ -26,7 +26,8 @@ static void account(pfl_t *f, uint32_t event)
     f->reset_t_us = f->t_us;
     f->resample_pending = 0u;
     pfl_count(&f->resets, 1u);
-    pfl_watch_reset(f, event);
+    f->watched.event |= event;
+    (void)pfl_watch_tell(f, WATCH_RESET, 0u, NULL);
 }
 
 static pfl_status_t reset(pfl_t *f, uint64_t t_us)
@@ -67,20 +68,10 @@ static void redraw(pfl_t *f, const pfl_sensor_t *sensor, const void *z, const pf
     pfl_guard_after_callback(f);
 }
 
-/* The refusals of this sensor have just reached another multiple of the limit. */
-static bool reinjection_is_due(const pfl_t *f, uint16_t sensor)
+void pfl_reinject(pfl_t *f, uint32_t sensor, const void *z)
 {
-    const pfl_watch_t *watch = f->config->watch;
     const pfl_sensor_t *s = &f->config->sensors[sensor];
-    if ((watch == NULL) || !(watch->reinject > 0.0f) || ((s->redraw == NULL) && (f->config->draw == NULL))) {
-        return false;
-    }
-    return f->watched.phase == (uint32_t)PFL_PHASE_LOST;
-}
-
-void pfl_reinject(pfl_t *f, uint16_t sensor, const void *z)
-{
-    if (!reinjection_is_due(f, sensor)) {
+    if ((s->redraw == NULL) && (f->config->draw == NULL)) {
         return;
     }
     const uint32_t count = f->config->particles;
@@ -94,7 +85,7 @@ void pfl_reinject(pfl_t *f, uint16_t sensor, const void *z)
         const uint32_t n = ((count - first) < PFL_BATCH) ? (count - first) : PFL_BATCH;
         const pfl_batch_t batch = pfl_batch_at(f, first, n);
         pfl_make_noise(f, f->config->states, n);
-        redraw(f, &f->config->sensors[sensor], z, &batch);
+        redraw(f, s, z, &batch);
         (void)pfl_quarantine(f, first, n);
         pfl_clip_to_box(f, first, n);
     }

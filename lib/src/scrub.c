@@ -58,6 +58,7 @@ pfl_status_t pfl_scrub(pfl_t *f, uint32_t *mended)
         return entered;
     }
     const uint32_t before = f->mended;
+    pfl_weights_settle(f);
     pfl_count(&f->mended, mend_best(f) + count_outside_box(f));
     pfl_count(&f->mended, pfl_quarantine(f, 0u, f->config->particles));
     pfl_clip_to_box(f, 0u, f->config->particles);

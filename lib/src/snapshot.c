@@ -173,7 +173,10 @@ pfl_status_t pfl_snapshot(const pfl_t *f, void *buffer, size_t buffer_bytes)
     for (size_t d = 0u; d < states; d++) {
         at = put_floats(at, &f->x[d * f->stride], f->config->particles);
     }
-    at = put_floats(at, f->log_weight, f->config->particles);
+    for (uint32_t i = 0u; i < f->config->particles; i++) {
+        put_word(at, (f->weights_equal != 0u) ? 0u : pfl_load_u32(&f->log_weight[i]));
+        at += 4;
+    }
     put_word(at, crc32((const unsigned char *)buffer, bytes - 4u));
     return PFL_OK;
 }
@@ -322,6 +325,7 @@ static pfl_status_t restore(pfl_t *f, const void *buffer, size_t buffer_bytes)
     for (size_t d = 0u; d < states; d++) {
         at = get_floats(at, &f->x[d * f->stride], f->config->particles);
     }
+    f->weights_equal = 0u;
     (void)get_floats(at, f->log_weight, f->config->particles);
     return PFL_OK;
 }

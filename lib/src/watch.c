@@ -76,16 +76,6 @@ static void enter(pfl_t *f, pfl_phase_t phase)
     set_mode(f, PFL_MODE_USABLE, (phase == PFL_PHASE_TRACKING) || (phase == PFL_PHASE_DEGRADED));
 }
 
-float pfl_worst_ratio(const pfl_t *f)
-{
-    float worst = f->test_ratio;
-    for (uint32_t k = 0u; (f->sensor != NULL) && (k < f->config->sensor_count); k++) {
-        worst = (f->sensor[k].test_ratio > worst) ? f->sensor[k].test_ratio : worst;
-    }
-    const bool settling = f->watched.phase == (uint32_t)PFL_PHASE_SETTLING;
-    return (settling && (worst < f->watched.ratio_before)) ? f->watched.ratio_before : worst;
-}
-
 /* A reset must not look better than what made it necessary. */
 static void settle(pfl_t *f)
 {
@@ -138,44 +128,21 @@ static void judge(pfl_t *f)
     }
 }
 
-/* ---- What the cycle reports ----------------------------------------------------------------------------------- */
+/* ---- What the filter tells ------------------------------------------------------------------------------------- */
 
-void pfl_watch_start(pfl_t *f)
-{
-    for (uint32_t k = 0u; (f->sensor != NULL) && (k < f->config->sensor_count); k++) {
-        f->sensor[k].t_fused_us = f->t_us;
-    }
-    const bool mute = (f->config->budget_cycles != 0u) && (f->meter.mask == 0u);
-    f->watched.fault = mute ? PFL_FAULT_PORT : 0u;
-}
-
-void pfl_watch_cycle(pfl_t *f)
-{
-    f->watched.fault &= PFL_FAULT_PORT;
-    f->watched.event = 0u;
-    f->watched.quarantined = 0u;
-}
-
-void pfl_watch_moved(pfl_t *f, uint32_t quarantined)
+static void moved(pfl_t *f, uint32_t quarantined)
 {
     f->watched.quarantined += quarantined;
-    f->watched.event |= (quarantined != 0u) ? PFL_EVENT_QUARANTINED : 0u;
-    if (f->config->watch != NULL) {
-        set_mode(f, PFL_MODE_STALE, is_stale(f));
-        judge(f);
-    }
+    set_mode(f, PFL_MODE_STALE, is_stale(f));
+    judge(f);
 }
 
-void pfl_watch_fused(pfl_t *f, uint16_t sensor)
+static void fused(pfl_t *f, uint32_t sensor)
 {
     pfl_watched_t *w = &f->watched;
-    const pfl_watch_t *limits = f->config->watch;
-    w->reject &= ~(1u << sensor);
-    if (limits == NULL) {
-        return;
-    }
-    const float lean = (limits->lean_ratio > 0.0f) ? limits->lean_ratio : LEAN_RATIO;
-    w->lean = (f->ess < (lean * (float)f->config->particles)) ? (w->lean + 1u) : 0u;
+    const float configured = f->config->watch->lean_ratio;
+    const float lean = ((configured > 0.0f) ? configured : LEAN_RATIO) * (float)f->config->particles;
+    w->lean = (f->ess < lean) ? (w->lean + 1u) : 0u;
     w->refused = 0u;
     w->settled++;
     f->sensor[sensor].t_fused_us = f->t_us;
@@ -195,21 +162,20 @@ void pfl_watch_fused(pfl_t *f, uint16_t sensor)
     }
 }
 
-void pfl_watch_refused(pfl_t *f, uint16_t sensor)
+static void refused(pfl_t *f, uint32_t sensor, const void *z)
 {
-    f->watched.reject |= 1u << sensor;
-    if (f->config->watch != NULL) {
-        f->watched.refused++;
-        f->sensor[sensor].test_ratio = f->test_ratio;
-        f->sensor[sensor].refused++;
-        judge(f);
+    f->watched.refused++;
+    f->sensor[sensor].test_ratio = f->test_ratio;
+    f->sensor[sensor].refused++;
+    judge(f);
+    if ((f->watched.phase == (uint32_t)PFL_PHASE_LOST) && (f->config->watch->reinject > 0.0f)) {
+        pfl_reinject(f, sensor, z);
     }
 }
 
-void pfl_watch_reset(pfl_t *f, uint32_t event)
+static void restarted(pfl_t *f)
 {
-    f->watched.event |= event;
-    if ((f->config->watch == NULL) || (f->watched.phase == (uint32_t)PFL_PHASE_INIT)) {
+    if (f->watched.phase == (uint32_t)PFL_PHASE_INIT) {
         return;
     }
     if (f->watched.phase != (uint32_t)PFL_PHASE_LOST) {
@@ -229,13 +195,13 @@ static uint32_t hash_of(const void *z, size_t bytes)
     return hash;
 }
 
-pfl_status_t pfl_watch_content(pfl_t *f, uint16_t sensor, const void *z)
+static pfl_status_t admit(pfl_t *f, uint32_t sensor, const void *z)
 {
     const pfl_sensor_t *s = &f->config->sensors[sensor];
-    if ((f->config->watch == NULL) || (s->z_bytes == 0u)) {
+    pfl_sensor_track_t *track = &f->sensor[sensor];
+    if (s->z_bytes == 0u) {
         return PFL_OK;
     }
-    pfl_sensor_track_t *track = &f->sensor[sensor];
     const uint32_t content = hash_of(z, s->z_bytes);
     const bool same = (content == track->content) && (track->seen != 0u);
     if (same && (f->t_us == track->t_fused_us)) {
@@ -244,5 +210,31 @@ pfl_status_t pfl_watch_content(pfl_t *f, uint16_t sensor, const void *z)
     track->same = same ? (track->same + 1u) : 0u;
     track->content = content;
     track->seen = 1u;
-    return ((s->frozen_after != 0u) && (track->same >= s->frozen_after)) ? PFL_REJECTED : PFL_OK;
+    if ((s->frozen_after == 0u) || (track->same < s->frozen_after)) {
+        return PFL_OK;
+    }
+    f->watched.event |= PFL_EVENT_FROZEN;
+    return PFL_REJECTED;
+}
+
+pfl_status_t pfl_watch_keep(pfl_t *f, uint32_t what, uint32_t number, const void *z)
+{
+    switch ((pfl_watch_call_t)what) {
+    case WATCH_ADMIT:
+        return admit(f, number, z);
+    case WATCH_MOVED:
+        moved(f, number);
+        break;
+    case WATCH_FUSED:
+        fused(f, number);
+        break;
+    case WATCH_REFUSED:
+        refused(f, number, z);
+        break;
+    case WATCH_RESET:
+    default:
+        restarted(f);
+        break;
+    }
+    return PFL_OK;
 }

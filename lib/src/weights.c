@@ -7,33 +7,58 @@
 /* A little more than PFL_LOGLIK_MAX, which itself is legal: what remains of a legal log-likelihood is below zero. */
 #define LOGLIK_SHIFT 0.00097656262f
 
-void pfl_weigh_start(pfl_weigh_t *w)
+/* The rest of a group weighs nothing. */
+static void pad(float *log_weight, uint32_t n)
 {
+    for (uint32_t i = 0u; i < n; i++) {
+        log_weight[i] = pfl_from_bits((int32_t)0xFF800000u);
+    }
+}
+
+void pfl_weigh_start(pfl_weigh_t *w, bool gated)
+{
+    w->gated = gated ? 1u : 0u;
     w->worst_bits = INT32_MIN;
     w->best_bits = INT32_MAX;
     w->top_bits = INT32_MAX;
     w->top_first = 0u;
 }
 
-void pfl_weigh_batch(const pfl_t *f, uint32_t first, uint32_t n, float *ll, pfl_weigh_t *w)
+/* Three forms of one loop. Where the weights are equal there is nothing to add, and the best log-likelihood is the
+ * largest log-weight; where there is no gate nobody asks for it. */
+static inline int32_t weigh(const float *restrict old, float old_top, uint32_t n, float *restrict ll, pfl_weigh_t *w,
+                            bool equal, bool gated)
 {
-    const float *old = &f->log_weight[first];
-    const float old_top = f->log_weight_top;
     int32_t worst = w->worst_bits;
     int32_t best = w->best_bits;
     int32_t top = INT32_MAX;
     for (uint32_t i = 0u; i < n; i++) {
         const float y = ll[i] - LOGLIK_SHIFT;
-        const float s = (old[i] - old_top) + y;
+        const float s = equal ? y : ((old[i] - old_top) + y);
         const int32_t y_bits = pfl_bits(y);
         const int32_t s_bits = pfl_bits(s);
         ll[i] = s;
         worst = (y_bits > worst) ? y_bits : worst;
-        best = (y_bits < best) ? y_bits : best;
+        best = (gated && (y_bits < best)) ? y_bits : best;
         top = (s_bits < top) ? s_bits : top;
     }
     w->worst_bits = worst;
-    w->best_bits = best;
+    w->best_bits = (equal && (top < best)) ? top : best;
+    return top;
+}
+
+void pfl_weigh_batch(const pfl_t *f, uint32_t first, uint32_t n, float *ll, pfl_weigh_t *w)
+{
+    const float *old = &f->log_weight[first];
+    int32_t top;
+    if (f->weights_equal != 0u) {
+        top = weigh(old, 0.0f, n, ll, w, true, false);
+    } else if (w->gated != 0u) {
+        top = weigh(old, f->log_weight_top, n, ll, w, false, true);
+    } else {
+        top = weigh(old, f->log_weight_top, n, ll, w, false, false);
+    }
+    pad(&ll[n], (uint32_t)PFL_CEIL8(n) - n);
     if (top < w->top_bits) {
         w->top_bits = top;
         w->top_first = first;
@@ -42,11 +67,19 @@ void pfl_weigh_batch(const pfl_t *f, uint32_t first, uint32_t n, float *ll, pfl_
 
 void pfl_weights_equal(pfl_t *f)
 {
-    for (uint32_t i = 0u; i < f->stride; i++) {
-        f->log_weight[i] = 0.0f;
-    }
+    f->weights_equal = 1u;
     f->log_weight_top = 0.0f;
     f->scratch_is_weights = 0u;
+}
+
+void pfl_weights_settle(pfl_t *f)
+{
+    const uint32_t count = f->config->particles;
+    if (f->weights_equal != 0u) {
+        memset(f->log_weight, 0, sizeof(float) * count);
+        pad(&f->log_weight[count], f->stride - count);
+        f->weights_equal = 0u;
+    }
 }
 
 void pfl_weights_after_loss(pfl_t *f)

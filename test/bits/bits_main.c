@@ -388,11 +388,11 @@ static void ring_project(void *user, const pfl_batch_t *p)
 static void of_constraint_and_kernel(void)
 {
     static const uint32_t tries[] = {1u, 2u, 20u};
-    static const pfl_kernel_t kernel[] = {{0.1f, 0u}, {0.4f, 5u}};
+    static const pfl_kernel_t kernel[] = {{0.1f, 0u, pfl_kernel_move}, {0.4f, 5u, pfl_kernel_move}};
     run_t run;
     begin(13u);
     for (size_t k = 0u; k < (sizeof tries / sizeof tries[0]); k++) {
-        const pfl_constraint_t ring = {ring_inside, ring_project, NULL, tries[k]};
+        const pfl_constraint_t ring = {ring_inside, ring_project, NULL, tries[k], pfl_constraint_keep};
         for (uint32_t n = 1u; n <= 300u; n += 99u) {
             mill_run(&run, n, 3u)->config.constraint = &ring;
             (void)fly(&run);

@@ -53,6 +53,7 @@ static void make_watched(watched_t *w)
     w->config.sensors = w->sensors;
     w->config.sensor_count = 2u;
     w->config.ess_ratio = 0.5f;
+    w->watch.keep = pfl_watch_keep;
     w->config.watch = &w->watch;
 }
 

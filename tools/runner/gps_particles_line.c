@@ -58,7 +58,8 @@ void gps_particles_line(gps_particles_t *particles, pfl_config_t *config)
 
     particles->motion.coast = (pfl_coast_t){.axes = axes, .remember = particles->coloured ? 1u : 0u};
     /* The position before is left to the model, which writes it before anyone reads it. */
-    particles->kernel = (pfl_kernel_t){.width = KERNEL_WIDTH, .states_mask = (1u << (2u * axes)) - 1u};
+    particles->kernel =
+        (pfl_kernel_t){.move = pfl_kernel_move, .width = KERNEL_WIDTH, .states_mask = (1u << (2u * axes)) - 1u};
     set_sensors(particles);
     config->states = (uint16_t)(axes * (particles->coloured ? 3u : 2u));
     config->noises = 0u;

@@ -70,7 +70,8 @@ void gps_particles_turn(gps_particles_t *particles, pfl_config_t *config)
         .redraw_sigma = (float)GPS_TURN_REDRAW_SIGMA,
         .remember = particles->coloured ? 1u : 0u,
     };
-    particles->kernel = (pfl_kernel_t){.width = KERNEL_WIDTH, .states_mask = (1u << PFL_TURN_STATES) - 1u};
+    particles->kernel =
+        (pfl_kernel_t){.move = pfl_kernel_move, .width = KERNEL_WIDTH, .states_mask = (1u << PFL_TURN_STATES) - 1u};
     set_sensors(particles);
     config->states = particles->coloured ? PFL_TURN_REMEMBER_STATES : PFL_TURN_STATES;
     config->noises = 4u;

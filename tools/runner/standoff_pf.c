@@ -151,6 +151,7 @@ static void set_road(standoff_pf_t *pf)
         .project = project[pf->study->fallback],
         .user = &pf->road,
         .tries = pf->study->tries,
+        .keep = pfl_constraint_keep,
     };
 }
 
@@ -191,6 +192,7 @@ static void set_config(standoff_pf_t *pf, uint32_t run)
     pf->kernel = (pfl_kernel_t){
         .width = (float)s->kernel_width,
         .states_mask = (1u << PFL_LANE_ARC) | (1u << PFL_LANE_SPEED), /* the offset keeps to the road */
+        .move = pfl_kernel_move,
     };
     host_random_start(&random, s->seed, run, RANDOM_FILTER_SEED);
     pf->config = (pfl_config_t){

@@ -63,6 +63,7 @@ static void make_model(const uav_study_t *s, const uav_track_t *track, const uav
 
     *model = (model_t){.vehicle = uav_vehicle, .study = s, .clouds = clouds};
     model->vehicle.sigma_gust_mps = (float)s->set.sigma_gust_mps;
+    model->kernel.move = pfl_kernel_move;
     model->kernel.width = KERNEL_WIDTH;
     model->kernel.states_mask =
         (1u << PFL_AUTOPILOT_X) | (1u << PFL_AUTOPILOT_Y) | (1u << PFL_AUTOPILOT_SPEED) | (1u << PFL_AUTOPILOT_HEADING);

@@ -23,7 +23,7 @@
 extern "C" {
 #endif
 
-#define PFL_ABI 0x70660001u          /* write it into pfl_config_t.abi */
+#define PFL_ABI 0x70660002u          /* write it into pfl_config_t.abi */
 #define PFL_BATCH 64u                /* particles in one callback, at most */
 #define PFL_PARTICLES_MAX 1048576u   /* N */
 #define PFL_STATES_MAX 16u           /* D */
@@ -124,6 +124,9 @@ typedef enum {
     PFL_MOMENTS_MEAN = 1  /* weighted mean only: cheaper */
 } pfl_moments_t;
 
+/* A filter; it lives at the front of its arena. */
+typedef struct pfl pfl_t;
+
 /* inside[i] <- 1 where particle i is allowed, 0 where not. Pure; writes inside[0 .. n-1] only. */
 typedef void (*pfl_inside_fn)(void *user, const pfl_view_t *particles, uint32_t *inside);
 
@@ -138,7 +141,12 @@ typedef struct {
     pfl_project_fn project; /* not null */
     void *user;             /* handed to both; null: the configuration's */
     uint32_t tries; /* 1 .. PFL_TRIES_MAX; 1 is constant time. More than 1 needs PFL_RETRY_BYTES(D) more arena */
+    void (*keep)(pfl_t *f, const void *u, float dt_s, uint32_t first, uint32_t n); /* pfl_constraint_keep */
 } pfl_constraint_t;
+
+/* What does it. Not to be called, but to be named in pfl_constraint_t.keep: so the linker takes it along only for
+ * filters that have a constraint. */
+void pfl_constraint_keep(pfl_t *f, const void *u, float dt_s, uint32_t first, uint32_t n);
 
 #define PFL_TRIES_MAX 256u
 #define PFL_RETRY_BYTES(d) (8u * (size_t)PFL_BATCH * (size_t)(d))
@@ -148,9 +156,13 @@ typedef struct {
  * models whose own noise does not separate copies: parameters, biases, no noise at all. Needs PFL_MOMENTS_FULL.
  * O(N D^2) in a step that resamples. */
 typedef struct {
-    float width;          /* b, 0 < b < 1; 0.1 .. 0.5 usual */
-    uint32_t states_mask; /* bit d set: state d takes part; 0: all do */
+    float width;            /* b, 0 < b < 1; 0.1 .. 0.5 usual */
+    uint32_t states_mask;   /* bit d set: state d takes part; 0: all do */
+    void (*move)(pfl_t *f); /* pfl_kernel_move */
 } pfl_kernel_t;
+
+/* What does it. Not to be called, but to be named in pfl_kernel_t.move, as above. */
+void pfl_kernel_move(pfl_t *f);
 
 /* Judges the filter's phase (health.h). A zero takes the value in brackets. Needs PFL_WATCH_BYTES(sensors) more arena. */
 typedef struct {
@@ -164,7 +176,11 @@ typedef struct {
     float reinject;          /* when LOST, and a measurement is refused again: the share of the particles that is drawn
                                 anew, by the sensor's redraw or the configuration's draw, 0 .. 1; 0: never. It then
                                 waits for lost_rejects refusals more */
+    pfl_status_t (*keep)(pfl_t *f, uint32_t what, uint32_t number, const void *z); /* pfl_watch_keep */
 } pfl_watch_t;
+
+/* What does it. Not to be called, but to be named in pfl_watch_t.keep, as above. */
+pfl_status_t pfl_watch_keep(pfl_t *f, uint32_t what, uint32_t number, const void *z);
 
 #define PFL_WATCH_BYTES(sensors) (32u * (size_t)(sensors))
 
@@ -198,9 +214,6 @@ typedef struct {
 } pfl_config_t;
 
 /* ---- A filter's life ---------------------------------------------------------------------------------------- */
-
-/* A filter; it lives at the front of its arena. */
-typedef struct pfl pfl_t;
 
 /* Bytes of arena that a configuration needs: PFL_ARENA_BYTES, and what its constraint adds. 0 for null or a
  * configuration that pfl_init would refuse. O(D + sensors). */

@@ -101,10 +101,12 @@ static bool read_extras(void)
         constraint.project = tape_projects[project].project;
         constraint.user = &ring;
         constraint.tries = words_next();
+        constraint.keep = pfl_constraint_keep;
         words_next_type(&tape_ring, &ring, 1.0f);
         config.constraint = &constraint;
     }
     if (words_next() != 0u) {
+        kernel.move = pfl_kernel_move;
         kernel.width = words_next_float();
         kernel.states_mask = words_next();
         config.kernel = &kernel;

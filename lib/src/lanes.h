@@ -1,0 +1,136 @@
+/* The sums over particles: eight lanes each, particle i in lane i mod 8, added up as a fixed tree, so that a scalar core
+ * and any vector width give the same bits. Columns are padded to whole groups of eight with particles of weight zero.
+ *
+ * A group is PFL_LANE_PARTS registers, of vectors or of scalars: the restrict pointers let a compiler keep the sums
+ * there over the loop. The attributes allow vectors to be read from columns of floats wherever these begin. */
+#ifndef PFL_LANES_H
+#define PFL_LANES_H
+
+#include "bits.h"
+#include "math_kernels.h"
+
+#define PFL_LANES 8u
+#define PFL_LANE_PARTS (PFL_LANES / PFL_VECTOR_LANES)
+
+#if PFL_VECTOR_LANES > 1
+typedef float pfl_part_t __attribute__((vector_size(4 * PFL_VECTOR_LANES), aligned(4), may_alias));
+#else
+typedef float pfl_part_t;
+#endif
+
+static inline float pfl_lane_sum(const float *row)
+{
+    return ((row[0] + row[1]) + (row[2] + row[3])) + ((row[4] + row[5]) + (row[6] + row[7]));
+}
+
+/* row += x + y, in any order */
+static inline void pfl_lanes_sum(float *restrict row, const float *restrict x, const float *restrict y, uint32_t n)
+{
+    pfl_part_t *sum = (pfl_part_t *)row;
+    const pfl_part_t *value = (const pfl_part_t *)x;
+    const pfl_part_t *other = (const pfl_part_t *)y;
+    for (uint32_t groups = n / PFL_LANES; groups > 0u; groups--) {
+        for (uint32_t k = 0u; k < PFL_LANE_PARTS; k++) {
+            sum[k] += value[k];
+            sum[k] += other[k];
+        }
+        value += PFL_LANE_PARTS;
+        other += PFL_LANE_PARTS;
+    }
+}
+
+/* row += w (x - centre) */
+static inline void pfl_lanes_product(float *restrict row, const float *restrict w, const float *restrict x,
+                                     const float *centre, uint32_t n)
+{
+    const float c = centre[0];
+    pfl_part_t *sum = (pfl_part_t *)row;
+    const pfl_part_t *weight = (const pfl_part_t *)w;
+    const pfl_part_t *value = (const pfl_part_t *)x;
+    for (uint32_t groups = n / PFL_LANES; groups > 0u; groups--) {
+        for (uint32_t k = 0u; k < PFL_LANE_PARTS; k++) {
+            sum[k] += weight[k] * (value[k] - c);
+        }
+        weight += PFL_LANE_PARTS;
+        value += PFL_LANE_PARTS;
+    }
+}
+
+/* The same for two columns, `stride` apart, with rows and centres one after the other: they share the reading of the
+ * weights, and more sums than these a scalar core cannot keep in its registers. */
+static inline void pfl_lanes_products(float *restrict rows, const float *restrict w, const float *restrict x,
+                                      uint32_t stride, const float *centres, uint32_t n)
+{
+    const float c = centres[0];
+    const float d = centres[1];
+    pfl_part_t *sum = (pfl_part_t *)rows;
+    const pfl_part_t *weight = (const pfl_part_t *)w;
+    const pfl_part_t *value = (const pfl_part_t *)x;
+    const pfl_part_t *other = (const pfl_part_t *)(x + stride);
+    for (uint32_t groups = n / PFL_LANES; groups > 0u; groups--) {
+        for (uint32_t k = 0u; k < PFL_LANE_PARTS; k++) {
+            sum[k] += weight[k] * (value[k] - c);
+        }
+        for (uint32_t k = 0u; k < PFL_LANE_PARTS; k++) {
+            sum[PFL_LANE_PARTS + k] += weight[k] * (other[k] - d);
+        }
+        weight += PFL_LANE_PARTS;
+        value += PFL_LANE_PARTS;
+        other += PFL_LANE_PARTS;
+    }
+}
+
+/* exp(-e) for e >= 0: 2^y, y = k + r, |r| <= 1/2. 0 below 2^-63, so that no square is a subnormal number, and a particle
+ * without weight has none however far away it is. */
+static inline float pfl_weight_of(float e)
+{
+    const int32_t most = 0x422E47AE; /* 43.57; floats without sign are ordered as their bits */
+#if PFL_VECTOR_LANES > 1
+    const int32_t counts = -(int32_t)(pfl_bits(e) < most);
+    const float y = pfl_from_bits(pfl_bits(e) & counts) * -1.44269504f;
+#else
+    if (pfl_bits(e) >= most) {
+        return 0.0f;
+    }
+    const int32_t counts = -1;
+    const float y = e * -1.44269504f;
+#endif
+    const float biased = y + PFL_ROUND_MAGIC;
+    const float r = y - (biased - PFL_ROUND_MAGIC);
+    float p = 1.32764783e-3f; /* 7.5e-8 */
+    p = (p * r) + 9.67554189e-3f;
+    p = (p * r) + 5.55071309e-2f;
+    p = (p * r) + 2.40221202e-1f;
+    p = (p * r) + 6.93146944e-1f;
+    p = (p * r) + 1.00000012f;
+    const uint32_t power = (uint32_t)pfl_bits(p) + ((uint32_t)pfl_bits(biased) << 23);
+    return pfl_from_bits((int32_t)power & counts);
+}
+
+/* w = exp(s - top); rows += w and w^2. A vector of weights is summed while it is at hand; a scalar core does better
+ * with a loop for each, whose constants and sums stay in its registers. */
+static inline void pfl_lanes_weigh(float *restrict rows, float *restrict w, const float *restrict s, float top,
+                                   uint32_t n)
+{
+    const uint32_t piece = (PFL_VECTOR_LANES > 1) ? PFL_LANES : n;
+    pfl_part_t *sum = (pfl_part_t *)rows;
+    for (uint32_t pieces = (PFL_VECTOR_LANES > 1) ? (n / PFL_LANES) : 1u; pieces > 0u; pieces--) {
+        for (uint32_t i = 0u; i < piece; i++) {
+            w[i] = pfl_weight_of(top - s[i]);
+        }
+        const pfl_part_t *weight = (const pfl_part_t *)w;
+        for (uint32_t groups = piece / PFL_LANES; groups > 0u; groups--) {
+            for (uint32_t k = 0u; k < PFL_LANE_PARTS; k++) {
+                sum[k] += weight[k];
+            }
+            for (uint32_t k = 0u; k < PFL_LANE_PARTS; k++) {
+                sum[PFL_LANE_PARTS + k] += weight[k] * weight[k];
+            }
+            weight += PFL_LANE_PARTS;
+        }
+        s += piece;
+        w += piece;
+    }
+}
+
+#endif
