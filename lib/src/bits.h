@@ -27,7 +27,8 @@
 #if !defined(PFL_VECTOR_LANES)
 #if defined(__GNUC__) && defined(__AVX__)
 #define PFL_VECTOR_LANES 8
-#elif defined(__GNUC__) && (defined(__SSE2__) || (defined(__aarch64__) && defined(__ARM_NEON)))
+#elif defined(__GNUC__) && (defined(__SSE2__) || (defined(__aarch64__) && defined(__ARM_NEON)) ||                      \
+                            (defined(__ARM_FEATURE_MVE) && ((__ARM_FEATURE_MVE & 2) != 0)))
 #define PFL_VECTOR_LANES 4
 #else
 #define PFL_VECTOR_LANES 1

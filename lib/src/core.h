@@ -111,6 +111,12 @@ struct pfl {
     pfl_rng_t rng;                 /* unguarded: any state but zero is as good as any other */
 };
 
+/* Length of a column in whole groups of eight; the rest of its stride is a canary. */
+static inline uint32_t pfl_padded(const pfl_t *f)
+{
+    return (uint32_t)PFL_CEIL8(f->config->particles);
+}
+
 /* arena.c */
 bool pfl_config_is_good(const pfl_config_t *c);
 pfl_status_t pfl_lay_out(void *arena, size_t arena_bytes, const pfl_config_t *c, pfl_t **out);

@@ -127,7 +127,7 @@ PFL_NOINLINE static pfl_status_t weigh(pfl_t *f, const pfl_sensor_t *sensor, con
 {
     const uint32_t count = f->config->particles;
     void *user = (sensor->user != NULL) ? sensor->user : f->config->user;
-    pfl_weigh_start(w, sensor->gate > 0.0f);
+    pfl_weigh_start(w, (sensor->gate > 0.0f) || (f->config->watch != NULL));
     f->scratch_is_weights = 0u;
     for (uint32_t first = 0u; first < count; first += PFL_BATCH) {
         const uint32_t n = ((count - first) < PFL_BATCH) ? (count - first) : PFL_BATCH;
@@ -153,7 +153,9 @@ PFL_NOINLINE static pfl_status_t judge(pfl_t *f, const pfl_sensor_t *sensor, con
         return pfl_fault(f, positive ? PFL_ERR_LOGLIK : PFL_ERR_NONFINITE);
     }
     const float best = pfl_from_bits(w->best_bits) + PFL_LOGLIK_MAX;
-    f->watched.best_loglik = pfl_is_finite(best) ? best : -FLT_MAX;
+    if (w->gated != 0u) {
+        f->watched.best_loglik = pfl_is_finite(best) ? best : -FLT_MAX;
+    }
     if (sensor->gate > 0.0f) {
         const float ratio = (-2.0f * best) / sensor->gate;
         f->test_ratio = pfl_is_finite(ratio) ? ((ratio > 0.0f) ? ratio : 0.0f) : FLT_MAX;

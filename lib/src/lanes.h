@@ -69,10 +69,9 @@ static inline void pfl_lanes_products(float *restrict rows, const float *restric
     const pfl_part_t *other = (const pfl_part_t *)(x + stride);
     for (uint32_t groups = n / PFL_LANES; groups > 0u; groups--) {
         for (uint32_t k = 0u; k < PFL_LANE_PARTS; k++) {
-            sum[k] += weight[k] * (value[k] - c);
-        }
-        for (uint32_t k = 0u; k < PFL_LANE_PARTS; k++) {
-            sum[PFL_LANE_PARTS + k] += weight[k] * (other[k] - d);
+            const pfl_part_t part = weight[k];
+            sum[k] += part * (value[k] - c);
+            sum[PFL_LANE_PARTS + k] += part * (other[k] - d);
         }
         weight += PFL_LANE_PARTS;
         value += PFL_LANE_PARTS;
@@ -121,10 +120,9 @@ static inline void pfl_lanes_weigh(float *restrict rows, float *restrict w, cons
         const pfl_part_t *weight = (const pfl_part_t *)w;
         for (uint32_t groups = piece / PFL_LANES; groups > 0u; groups--) {
             for (uint32_t k = 0u; k < PFL_LANE_PARTS; k++) {
-                sum[k] += weight[k];
-            }
-            for (uint32_t k = 0u; k < PFL_LANE_PARTS; k++) {
-                sum[PFL_LANE_PARTS + k] += weight[k] * weight[k];
+                const pfl_part_t part = weight[k];
+                sum[k] += part;
+                sum[PFL_LANE_PARTS + k] += part * part;
             }
             weight += PFL_LANE_PARTS;
         }

@@ -231,9 +231,10 @@ static bool sweep(pfl_t *f, bool budgeted, uint32_t passes)
 {
     const bool in_batches = (f->config->budget_cycles != 0u) || is_full(f) || ((passes & PASS_CIRCLES) != 0u);
     const uint32_t piece = in_batches ? PFL_BATCH : LONG_PIECE;
+    const uint32_t padded = pfl_padded(f);
     pfl_weights_settle(f);
-    for (uint32_t first = 0u; first < f->stride; first += piece) {
-        const uint32_t n = ((f->stride - first) < piece) ? (f->stride - first) : piece;
+    for (uint32_t first = 0u; first < padded; first += piece) {
+        const uint32_t n = ((padded - first) < piece) ? (padded - first) : piece;
         if (budgeted && pfl_meter_spent(f)) {
             return false;
         }

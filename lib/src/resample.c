@@ -77,7 +77,7 @@ PFL_NOINLINE static void quantise_lanes(float *column, const float *end, float s
 static void quantise(pfl_t *f, uint32_t *sums)
 {
     memset(sums, 0, sizeof(uint32_t) * LANES);
-    quantise_lanes(f->scratch, &f->scratch[f->stride], QUANTA / f->weight_sum, sums);
+    quantise_lanes(f->scratch, &f->scratch[pfl_padded(f)], QUANTA / f->weight_sum, sums);
 }
 
 static uint32_t total_of(const uint32_t *sums)
@@ -127,14 +127,14 @@ static void comb_lanes(pfl_t *f, const comb_t *comb, const uint32_t *sums, uint3
         lanes[LANES + l] = (height(comb, sum) + start) >> comb->shift;
         sum += sums[l];
     }
-    comb_vectors(f->scratch, &f->scratch[f->stride], comb, start, lanes);
+    comb_vectors(f->scratch, &f->scratch[pfl_padded(f)], comb, start, lanes);
 }
 #else
 static void comb_lanes(pfl_t *f, const comb_t *comb, const uint32_t *sums, uint32_t start)
 {
     const comb_t c = *comb;
     float *const column = f->scratch;
-    const float *const end = &f->scratch[f->stride];
+    const float *const end = &f->scratch[pfl_padded(f)];
     uint32_t reach = 0u;
     uint32_t before = 0u;
     (void)sums;
@@ -318,7 +318,7 @@ static void copy_state(const pfl_t *f, float *x, uint32_t parents)
 {
     const float *const offspring = f->scratch;
     const float *slot = f->log_weight;
-    const float *parent = &f->log_weight[f->stride];
+    const float *parent = &f->log_weight[pfl_padded(f)];
     for (uint32_t k = 0u; k < parents; k++) {
         parent--;
         const uint32_t from = pfl_load_u32(parent);
@@ -335,7 +335,7 @@ static void copy_four_states(const pfl_t *f, float *a, uint32_t parents)
 {
     const float *const offspring = f->scratch;
     const float *slot = f->log_weight;
-    const float *parent = &f->log_weight[f->stride];
+    const float *parent = &f->log_weight[pfl_padded(f)];
     float *b = a + f->stride;
     float *c = b + f->stride;
     float *d = c + f->stride;
@@ -359,10 +359,10 @@ static void copy_four_states(const pfl_t *f, float *a, uint32_t parents)
 
 PFL_NOINLINE static void copy_surplus(pfl_t *f)
 {
-    for (uint32_t i = f->config->particles; i < f->stride; i++) {
+    for (uint32_t i = f->config->particles; i < pfl_padded(f); i++) {
         pfl_store_u32(&f->scratch[i], 1u); /* padding stays as it is */
     }
-    const uint32_t parents = list_moves(f->scratch, f->log_weight, f->stride);
+    const uint32_t parents = list_moves(f->scratch, f->log_weight, pfl_padded(f));
     uint32_t d = 0u;
     for (; (d + 4u) <= f->config->states; d += 4u) {
         copy_four_states(f, &f->x[(size_t)d * f->stride], parents);

@@ -77,7 +77,7 @@ void pfl_weights_settle(pfl_t *f)
     const uint32_t count = f->config->particles;
     if (f->weights_equal != 0u) {
         memset(f->log_weight, 0, sizeof(float) * count);
-        pad(&f->log_weight[count], f->stride - count);
+        pad(&f->log_weight[count], pfl_padded(f) - count);
         f->weights_equal = 0u;
     }
 }

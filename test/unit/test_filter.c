@@ -556,6 +556,75 @@ void test_losing_the_only_weight_leaves_a_filter_that_works(void)
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_update(f, 0u, 1000u, ll));
 }
 
+/* ---- Equal weights -------------------------------------------------------------------------------------------------- */
+
+/* A filter marks them with a flag; one restored from its snapshot holds a column of zeros. Nobody may see which. */
+static pfl_t *with_column(const pfl_t *f, const pfl_config_t *c)
+{
+    pfl_t *g = ut_filter(c);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_restore(g, ut_snapshot(f), pfl_snapshot_bytes(f)));
+    return g;
+}
+
+static void same_filters(const pfl_t *f, const pfl_t *g)
+{
+    float of_f[N];
+    float of_g[N];
+    pfl_view_t view;
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_particles(f, &view, of_f));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_particles(g, &view, of_g));
+    TEST_ASSERT_EQUAL_MEMORY(of_f, of_g, sizeof of_f);
+    TEST_ASSERT_TRUE(ut_same_bytes(ut_snapshot(f), ut_snapshot(g), pfl_snapshot_bytes(f)));
+    TEST_ASSERT_TRUE(pfl_invariants_hold(f) && pfl_invariants_hold(g));
+}
+
+void test_equal_weights_are_a_column_of_zeros_to_an_update(void)
+{
+    const float special[] = {0.0f, -ut_infinity(), ut_nan(false), ut_nan(true), ut_infinity(), 0.5f};
+    for (uint32_t k = 0u; k < (N * 12u); k++) {
+        const pfl_sensor_t sensor = {.loglik = ut_dictated_loglik, .gate = ((k % 2u) != 0u) ? 3.0f : 0.0f};
+        pfl_config_t c = ut_dictated_config(N, 2u);
+        c.sensors = &sensor;
+        c.ess_ratio = 1.0f; /* equal again after every update */
+        pfl_t *f = ut_filter(&c);
+        for (uint32_t round = 0u; round < 2u; round++) {
+            pfl_t *g = with_column(f, &c);
+            for (uint32_t i = 0u; i < N; i++) {
+                ll[i] = -0.2f - (0.01f * (float)((i * 7u) % N));
+            }
+            ll[k % N] = special[(k / 2u) % 6u];
+            TEST_ASSERT_EQUAL_INT(pfl_update(g, 0u, 0u, ll), pfl_update(f, 0u, 0u, ll));
+            TEST_ASSERT_EQUAL_HEX32(ut_bits(health_of(g).test_ratio), ut_bits(health_of(f).test_ratio));
+            same_filters(f, g);
+        }
+        ut_arenas_end();
+    }
+}
+
+void test_equal_weights_are_a_column_of_zeros_to_what_else_reads_them(void)
+{
+    for (uint32_t k = 0u; k < N; k++) {
+        float value[2];
+        sabotage_t s;
+        const pfl_config_t c = sabotaged(&s, k, k + 1u, ut_nan(false));
+        pfl_t *f = ut_filter(&c);
+        pfl_t *g = with_column(f, &c);
+        if ((k % 2u) == 0u) {
+            TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_quantile(f, 0u, 0.3f, &value[0]));
+            TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_quantile(g, 0u, 0.3f, &value[1]));
+            TEST_ASSERT_EQUAL_HEX32(ut_bits(value[0]), ut_bits(value[1]));
+            TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_resample(f));
+            TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_resample(g));
+            same_filters(f, g);
+        }
+        s.step = 0u;
+        TEST_ASSERT_EQUAL_INT(PFL_QUARANTINED, pfl_predict(f, 100000u, NULL));
+        TEST_ASSERT_EQUAL_INT(PFL_QUARANTINED, pfl_predict(g, 100000u, NULL));
+        same_filters(f, g);
+        ut_arenas_end();
+    }
+}
+
 /* ---- Calls from inside callbacks ------------------------------------------------------------------------------------- */
 
 static pfl_t *own;

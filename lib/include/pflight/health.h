@@ -69,7 +69,8 @@ typedef struct {
     float ess;                /* effective sample size at the last update */
     float test_ratio;         /* the worst of the sensors' last ones; -2 max ll / gate; > 1 rejected, < 0.5 normal; 0
                                  without gates. While SETTLING never below what it was before */
-    float best_loglik;        /* best log-likelihood of any particle at the last update */
+    float best_loglik;        /* best log-likelihood of any particle at the last update of a sensor with a gate, or
+                                 of any with a watch */
     pfl_phase_t phase;        /* INIT always without a watch */
     uint32_t fault;           /* PFL_FAULT_ */
     uint32_t reject;          /* bit k: sensor k */
