@@ -27,7 +27,7 @@ typedef struct {
 } comb_t;
 
 /* 0 < count <= 2^20, 2^30 < total < 2^31. */
-static comb_t comb_of(uint32_t count, uint32_t total)
+PFL_NOINLINE static comb_t comb_of(uint32_t count, uint32_t total)
 {
     uint32_t shift = 29u;
     while ((count >> (30u - shift)) != 0u) {

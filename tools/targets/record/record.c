@@ -526,7 +526,7 @@ WRAP(pfl_status_t, pfl_nmpc_solve,
     }
     put_float(problem->distance_m);
     put_type(&tape_nmpc_plan, plan);
-    const pfl_status_t status = answer_status(__real_pfl_nmpc_solve(nmpc, problem, plan, &ours));
+    const pfl_status_t status = answer_status(__real_pfl_nmpc_solve(nmpc, problem, plan, work, &ours));
     answer_words(plan, sizeof *plan);
     answer_words(&ours, sizeof ours);
     if (report != NULL) {
