@@ -22,12 +22,21 @@ typedef struct {
     float heading, turn; /* at the end */
 } flight_t;
 
+/* What the caller's workspace holds. */
+typedef struct {
+    float pair_x[STEPS + 1u], pair_y[STEPS + 1u], pair_r[STEPS + 1u]; /* seen from the target */
+    flight_t flight;
+    pfl_nmpc_plan_t plan, candidate, gradient, fresh;
+} work_t;
+
+typedef char pfl_nmpc_work_fits[(sizeof(work_t) <= sizeof(pfl_nmpc_work_t)) ? 1 : -1];
+
 /* A problem, with what does not depend on the plan. */
 typedef struct {
     const pfl_nmpc_t *g;
     const pfl_nmpc_problem_t *problem;
-    float pair_x[STEPS + 1u], pair_y[STEPS + 1u], pair_r[STEPS + 1u]; /* seen from the target */
-    float over_rd2;                                                   /* 1 / rd^2 */
+    work_t *work;
+    float over_rd2; /* 1 / rd^2 */
 } context_t;
 
 /* The place of step k, seen from target and pair. */
@@ -76,17 +85,14 @@ static float length_of(float x, float y)
     return (r < NEAR_M) ? NEAR_M : r;
 }
 
-static context_t make_context(const pfl_nmpc_t *g, const pfl_nmpc_problem_t *problem)
+static context_t make_context(const pfl_nmpc_t *g, const pfl_nmpc_problem_t *problem, pfl_nmpc_work_t *work)
 {
-    context_t c;
-    memset(&c, 0, sizeof c);
-    c.g = g;
-    c.problem = problem;
-    c.over_rd2 = 1.0f / (problem->distance_m * problem->distance_m);
+    work_t *w = (work_t *)(void *)work->numbers;
+    const context_t c = {g, problem, w, 1.0f / (problem->distance_m * problem->distance_m)};
     for (uint32_t k = 0u; (problem->pair != NULL) && (k <= STEPS); k++) {
-        c.pair_x[k] = problem->pair->x_m[k] - problem->target->x_m[k];
-        c.pair_y[k] = problem->pair->y_m[k] - problem->target->y_m[k];
-        c.pair_r[k] = length_of(c.pair_x[k], c.pair_y[k]);
+        w->pair_x[k] = problem->pair->x_m[k] - problem->target->x_m[k];
+        w->pair_y[k] = problem->pair->y_m[k] - problem->target->y_m[k];
+        w->pair_r[k] = length_of(w->pair_x[k], w->pair_y[k]);
     }
     return c;
 }
@@ -102,10 +108,11 @@ static place_t look(const context_t *c, const pfl_nmpc_path_t *path, uint32_t k)
     p.rt = 1.0f - (((p.x * p.x) + (p.y * p.y)) * c->over_rd2);
     if (problem->pair != NULL) {
         if (c->g->phase_form == (uint32_t)PFL_PHASE_DIRECTION) {
-            p.ex = (p.x / p.r) + (c->pair_x[k] / c->pair_r[k]);
-            p.ey = (p.y / p.r) + (c->pair_y[k] / c->pair_r[k]);
+            p.ex = (p.x / p.r) + (c->work->pair_x[k] / c->work->pair_r[k]);
+            p.ey = (p.y / p.r) + (c->work->pair_y[k] / c->work->pair_r[k]);
         } else {
-            p.dt = (((p.x * c->pair_x[k]) + (p.y * c->pair_y[k])) + (p.r * c->pair_r[k])) * c->over_rd2;
+            p.dt =
+                (((p.x * c->work->pair_x[k]) + (p.y * c->work->pair_y[k])) + (p.r * c->work->pair_r[k])) * c->over_rd2;
         }
         p.gap_x = path->x_m[k] - problem->pair->x_m[k];
         p.gap_y = path->y_m[k] - problem->pair->y_m[k];
@@ -178,9 +185,9 @@ static void place_gradient(const context_t *c, const flight_t *f, uint32_t k, fl
             y += share * (p.ey - (along * uy));
         } else {
             const float share = (phase_weight(g, k) * p.dt) * c->over_rd2;
-            const float ratio = c->pair_r[k] / p.r;
-            x += share * (c->pair_x[k] + (ratio * p.x));
-            y += share * (c->pair_y[k] + (ratio * p.y));
+            const float ratio = c->work->pair_r[k] / p.r;
+            x += share * (c->work->pair_x[k] + (ratio * p.x));
+            y += share * (c->work->pair_y[k] + (ratio * p.y));
         }
         const float push = (g->penalty * p.close) / (g->separation_m * p.gap);
         x -= push * p.gap_x;
@@ -240,14 +247,13 @@ static float dot(const scale_t *s, const pfl_nmpc_plan_t *a, const pfl_nmpc_plan
     return (s->speed2 * speed) + (s->turn2 * turn);
 }
 
-static pfl_nmpc_plan_t moved(const scale_t *s, const pfl_nmpc_plan_t *plan, const pfl_nmpc_plan_t *gradient, float step)
+static void move_plan(const scale_t *s, const pfl_nmpc_plan_t *plan, const pfl_nmpc_plan_t *gradient, float step,
+                      pfl_nmpc_plan_t *out)
 {
-    pfl_nmpc_plan_t out;
     for (uint32_t k = 0u; k < STEPS; k++) {
-        out.speed_mps[k] = plan->speed_mps[k] - ((step * s->speed2) * gradient->speed_mps[k]);
-        out.turn_radps[k] = plan->turn_radps[k] - ((step * s->turn2) * gradient->turn_radps[k]);
+        out->speed_mps[k] = plan->speed_mps[k] - ((step * s->speed2) * gradient->speed_mps[k]);
+        out->turn_radps[k] = plan->turn_radps[k] - ((step * s->turn2) * gradient->turn_radps[k]);
     }
-    return out;
 }
 
 /* The next step length, from the last move, -step times the old gradient, and how the gradient changed over it. */
@@ -259,17 +265,17 @@ static float next_step(const scale_t *s, float step, const pfl_nmpc_plan_t *old,
 }
 
 /* Searches along the gradient; true when a trial was good enough: plan, flight and cost are then its own. */
-static bool improve(const context_t *c, const scale_t *s, const pfl_nmpc_plan_t *gradient, float *step,
-                    pfl_nmpc_plan_t *plan, flight_t *flight, pfl_nmpc_report_t *report)
+static bool improve(const context_t *c, const scale_t *s, float *step, pfl_nmpc_report_t *report)
 {
-    const float slope = DESCENT_SHARE * dot(s, gradient, gradient);
+    work_t *w = c->work;
+    const float slope = DESCENT_SHARE * dot(s, &w->gradient, &w->gradient);
     for (uint32_t trial = 0u; trial < PFL_NMPC_TRIALS; trial++) {
-        const pfl_nmpc_plan_t candidate = moved(s, plan, gradient, *step);
-        fly(c->g, &c->problem->uav, &candidate, flight);
-        const float cost = cost_of(c, &candidate, flight);
+        move_plan(s, &w->plan, &w->gradient, *step, &w->candidate);
+        fly(c->g, &c->problem->uav, &w->candidate, &w->flight);
+        const float cost = cost_of(c, &w->candidate, &w->flight);
         report->evaluations++;
         if (cost <= (report->cost - (slope * *step))) {
-            *plan = candidate;
+            w->plan = w->candidate;
             report->cost = cost;
             return true;
         }
@@ -278,24 +284,22 @@ static bool improve(const context_t *c, const scale_t *s, const pfl_nmpc_plan_t 
     return false;
 }
 
-static pfl_nmpc_report_t descend(const context_t *c, pfl_nmpc_plan_t *plan)
+static pfl_nmpc_report_t descend(const context_t *c)
 {
     const pfl_uav_limits_t *l = &c->g->limits;
     const scale_t s = {l->speed_range_mps * l->speed_range_mps, l->turn_max_radps * l->turn_max_radps};
-    pfl_nmpc_plan_t gradient;
-    pfl_nmpc_plan_t fresh;
-    flight_t flight;
+    work_t *w = c->work;
     float step = STEP_FIRST;
-    fly(c->g, &c->problem->uav, plan, &flight);
-    pfl_nmpc_report_t report = {cost_of(c, plan, &flight), 1u};
-    gradient_of(c, plan, &flight, &gradient);
+    fly(c->g, &c->problem->uav, &w->plan, &w->flight);
+    pfl_nmpc_report_t report = {cost_of(c, &w->plan, &w->flight), 1u};
+    gradient_of(c, &w->plan, &w->flight, &w->gradient);
     for (uint32_t iteration = 0u; iteration < PFL_NMPC_ITERATIONS; iteration++) {
-        if (!improve(c, &s, &gradient, &step, plan, &flight, &report)) {
+        if (!improve(c, &s, &step, &report)) {
             step = STEP_AFTER_FAILURE;
         } else if ((iteration + 1u) < PFL_NMPC_ITERATIONS) {
-            gradient_of(c, plan, &flight, &fresh);
-            step = next_step(&s, step, &gradient, &fresh);
-            gradient = fresh;
+            gradient_of(c, &w->plan, &w->flight, &w->fresh);
+            step = next_step(&s, step, &w->gradient, &w->fresh);
+            w->gradient = w->fresh;
         } else {
             /* the last move needs no gradient */
         }
@@ -390,46 +394,45 @@ pfl_status_t pfl_nmpc_extrapolate(const pfl_nmpc_t *nmpc, const pfl_target_t *ta
 }
 
 pfl_status_t pfl_nmpc_cost(const pfl_nmpc_t *nmpc, const pfl_nmpc_problem_t *problem, const pfl_nmpc_plan_t *plan,
-                           float *cost, pfl_nmpc_plan_t *gradient)
+                           pfl_nmpc_work_t *work, float *cost, pfl_nmpc_plan_t *gradient)
 {
-    flight_t flight;
-    pfl_nmpc_plan_t slope;
-    if ((nmpc == NULL) || (problem == NULL) || (plan == NULL) || (cost == NULL) || !settings_are_good(nmpc) ||
-        !problem_is_good(problem) || !plan_is_good(plan)) {
+    if ((nmpc == NULL) || (problem == NULL) || (plan == NULL) || (work == NULL) || (cost == NULL) ||
+        !settings_are_good(nmpc) || !problem_is_good(problem) || !plan_is_good(plan)) {
         return PFL_ERR_ARG;
     }
-    const context_t c = make_context(nmpc, problem);
-    fly(nmpc, &problem->uav, plan, &flight);
-    const float value = cost_of(&c, plan, &flight);
-    gradient_of(&c, plan, &flight, &slope);
-    if (!pfl_is_finite(value) || !plan_is_good(&slope)) {
+    const context_t c = make_context(nmpc, problem, work);
+    fly(nmpc, &problem->uav, plan, &c.work->flight);
+    const float value = cost_of(&c, plan, &c.work->flight);
+    gradient_of(&c, plan, &c.work->flight, &c.work->gradient);
+    if (!pfl_is_finite(value) || !plan_is_good(&c.work->gradient)) {
         return PFL_ERR_NONFINITE;
     }
     *cost = value;
     if (gradient != NULL) {
-        *gradient = slope;
+        *gradient = c.work->gradient;
     }
     return PFL_OK;
 }
 
 pfl_status_t pfl_nmpc_solve(const pfl_nmpc_t *nmpc, const pfl_nmpc_problem_t *problem, pfl_nmpc_plan_t *plan,
-                            pfl_nmpc_report_t *report)
+                            pfl_nmpc_work_t *work, pfl_nmpc_report_t *report)
 {
-    if ((nmpc == NULL) || (problem == NULL) || (plan == NULL) || !settings_are_good(nmpc) ||
+    if ((nmpc == NULL) || (problem == NULL) || (plan == NULL) || (work == NULL) || !settings_are_good(nmpc) ||
         !problem_is_good(problem) || !plan_is_good(plan)) {
         return PFL_ERR_ARG;
     }
-    const context_t c = make_context(nmpc, problem);
+    const context_t c = make_context(nmpc, problem, work);
     const pfl_uav_limits_t *l = &nmpc->limits;
-    pfl_nmpc_plan_t better = *plan;
-    const pfl_nmpc_report_t done = descend(&c, &better);
+    const pfl_nmpc_plan_t *better = &c.work->plan;
+    c.work->plan = *plan;
+    const pfl_nmpc_report_t done = descend(&c);
     if (!pfl_is_finite(done.cost)) {
         return PFL_ERR_NONFINITE;
     }
     for (uint32_t k = 0u; k < STEPS; k++) { /* a trial that is not finite is never taken: neither is this plan */
         plan->speed_mps[k] =
-            pfl_clip(better.speed_mps[k], l->cruise_mps - l->speed_range_mps, l->cruise_mps + l->speed_range_mps);
-        plan->turn_radps[k] = pfl_clip(better.turn_radps[k], -l->turn_max_radps, l->turn_max_radps);
+            pfl_clip(better->speed_mps[k], l->cruise_mps - l->speed_range_mps, l->cruise_mps + l->speed_range_mps);
+        plan->turn_radps[k] = pfl_clip(better->turn_radps[k], -l->turn_max_radps, l->turn_max_radps);
     }
     if (report != NULL) {
         *report = done;

@@ -4,10 +4,12 @@
 #include "math_kernels.h"
 #include "sqrt_kernel.h"
 
-/* Wind over the ground of each particle of a batch, held over a step. */
+#define PART 16u /* particles at a time: what they need on the way stays on the stack, which is small */
+
+/* Wind over the ground of each particle of a part, held over a step. */
 typedef struct {
-    float x_mps[PFL_BATCH];
-    float y_mps[PFL_BATCH];
+    float x_mps[PART];
+    float y_mps[PART];
 } wind_t;
 
 static inline float clip(float x, float lo, float hi)
@@ -66,16 +68,15 @@ static void steer_route(const pfl_autopilot_t *m, const pfl_route_t *route, cons
     const float *restrict heading = PFL_STATE(p, PFL_AUTOPILOT_HEADING);
     float *restrict waypoint = PFL_STATE(p, m->waypoint_state);
     float *restrict out = error;
-    float to_x[PFL_BATCH];
-    float to_y[PFL_BATCH];
+    float to_x[PART];
     for (uint32_t i = 0u; i < p->n; i++) {
         const uint32_t target = pfl_route_switch(route, index_of(waypoint[i], route->count), x[i], y[i]);
         waypoint[i] = (float)target;
         to_x[i] = route->waypoint[target].x_m - x[i];
-        to_y[i] = route->waypoint[target].y_m - y[i];
+        out[i] = route->waypoint[target].y_m - y[i];
     }
     for (uint32_t i = 0u; i < p->n; i++) {
-        out[i] = pfl_wrap_pi_kernel(pfl_atan2_kernel(to_y[i], to_x[i]) - heading[i]);
+        out[i] = pfl_wrap_pi_kernel(pfl_atan2_kernel(out[i], to_x[i]) - heading[i]);
     }
 }
 
@@ -127,14 +128,12 @@ static void move_height(const pfl_autopilot_t *m, float height_m, float dt_s, co
     }
 }
 
-void pfl_autopilot_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p)
+static void move_part(const pfl_autopilot_t *m, const pfl_autopilot_input_t *wanted, float dt_s, const pfl_batch_t *p)
 {
-    const pfl_autopilot_t *m = (const pfl_autopilot_t *)user;
-    const pfl_autopilot_input_t *wanted = (const pfl_autopilot_input_t *)u;
     const uint32_t substeps = (m->substeps > 0u) ? m->substeps : 1u;
     const float step_s = dt_s / (float)substeps;
     wind_t wind;
-    float error[PFL_BATCH];
+    float error[PART];
     hold_wind(m, p, &wind);
     for (uint32_t k = 0u; k < substeps; k++) {
         if ((wanted->route != NULL) && (m->waypoint_state != 0u)) {
@@ -146,4 +145,14 @@ void pfl_autopilot_predict(void *user, const void *u, float dt_s, const pfl_batc
         move_height(m, wanted->height_m, step_s, p);
     }
     walk_wind(m, dt_s, p);
+}
+
+void pfl_autopilot_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p)
+{
+    for (uint32_t first = 0u; first < p->n; first += PART) {
+        const uint32_t rest = p->n - first;
+        const pfl_batch_t part = {p->x + first, p->stride, p->noise + first, p->first + first,
+                                  (rest < PART) ? rest : PART};
+        move_part((const pfl_autopilot_t *)user, (const pfl_autopilot_input_t *)u, dt_s, &part);
+    }
 }

@@ -27,7 +27,7 @@ typedef struct {
 } comb_t;
 
 /* 0 < count <= 2^20, 2^30 < total < 2^31. */
-static comb_t comb_of(uint32_t count, uint32_t total)
+PFL_NOINLINE static comb_t comb_of(uint32_t count, uint32_t total)
 {
     uint32_t shift = 29u;
     while ((count >> (30u - shift)) != 0u) {
@@ -48,9 +48,9 @@ static comb_t comb_of(uint32_t count, uint32_t total)
 }
 
 /* h(c) */
-static inline uint32_t height(const comb_t *comb, uint32_t c)
+static inline uint32_t height(uint32_t factor, uint32_t c)
 {
-    return (uint32_t)(((uint64_t)c * comb->factor) >> 32);
+    return (uint32_t)(((uint64_t)c * factor) >> 32);
 }
 
 /* Loops over eight lanes at a moving address, a step at a time: so gcc makes vectors of them, and as well as anything of
@@ -91,10 +91,9 @@ static uint32_t total_of(const uint32_t *sums)
  * vector runs through all lanes at once, each from where the one before ends; without vectors one lane after the other
  * keeps its sum in a register. The same counts either way. */
 #if defined(__SSE2__) || defined(__ARM_NEON)
-PFL_NOINLINE static void comb_vectors(float *column, const float *end, const comb_t *comb, uint32_t start,
-                                      uint32_t *lanes)
+PFL_NOINLINE static void comb_vectors(float *column, const float *end, uint32_t factor, uint32_t shift, uint32_t start,
+                                      float *lanes)
 {
-    const comb_t c = *comb;
     uint32_t reach[LANES];
     uint32_t before[LANES];
     PFL_COPY(reach, lanes, sizeof reach);
@@ -105,7 +104,7 @@ PFL_NOINLINE static void comb_vectors(float *column, const float *end, const com
             reach[l] += pfl_load_u32(&at[l]);
         }
         for (uint32_t l = 0u; l < LANES; l++) {
-            below[l] = (height(&c, reach[l]) + start) >> c.shift;
+            below[l] = (height(factor, reach[l]) + start) >> shift;
         }
         for (uint32_t l = 0u; l < LANES; l++) {
             pfl_store_u32(&at[l], below[l] - before[l]);
@@ -118,16 +117,17 @@ PFL_NOINLINE static void comb_vectors(float *column, const float *end, const com
     PFL_COPY(&lanes[LANES], before, sizeof before);
 }
 
+/* In the lanes of the moments, free by now, lie the sum where each lane begins and the points below it. In memory that
+ * outlives the call: what comb_vectors writes back keeps gcc's vectors together. */
 static void comb_lanes(pfl_t *f, const comb_t *comb, const uint32_t *sums, uint32_t start)
 {
-    uint32_t lanes[2u * LANES]; /* where each lane begins, and the points below that */
     uint32_t sum = 0u;
     for (uint32_t l = 0u; l < LANES; l++) {
-        lanes[l] = sum;
-        lanes[LANES + l] = (height(comb, sum) + start) >> comb->shift;
+        pfl_store_u32(&f->lanes[l], sum);
+        pfl_store_u32(&f->lanes[LANES + l], (height(comb->factor, sum) + start) >> comb->shift);
         sum += sums[l];
     }
-    comb_vectors(f->scratch, &f->scratch[pfl_padded(f)], comb, start, lanes);
+    comb_vectors(f->scratch, &f->scratch[pfl_padded(f)], comb->factor, comb->shift, start, f->lanes);
 }
 #else
 static void comb_lanes(pfl_t *f, const comb_t *comb, const uint32_t *sums, uint32_t start)
@@ -141,7 +141,7 @@ static void comb_lanes(pfl_t *f, const comb_t *comb, const uint32_t *sums, uint3
     for (uint32_t l = 0u; l < LANES; l++) {
         for (float *at = &column[l]; at < end; at += LANES) {
             reach += pfl_load_u32(at);
-            const uint32_t below = (height(&c, reach) + start) >> c.shift;
+            const uint32_t below = (height(c.factor, reach) + start) >> c.shift;
             pfl_store_u32(at, below - before);
             before = below;
         }
@@ -170,7 +170,7 @@ PFL_NOINLINE static void count_stratified(pfl_t *f)
     uint32_t start = 0u;
     for (uint32_t i = 0u; i < count; i++) {
         reach += pfl_load_u32(&f->scratch[i]);
-        const uint32_t high = height(&comb, reach);
+        const uint32_t high = height(comb.factor, reach);
         while ((drawn <= (high >> comb.shift)) && (drawn < count)) {
             start = pfl_xoshiro_next(f->rng.one) >> (32u - comb.shift);
             drawn++;

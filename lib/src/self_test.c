@@ -26,7 +26,7 @@ static void mix(uint64_t *hash, float x)
 }
 
 /* The arithmetic itself. Volatile operands keep it from being done by the compiler. */
-static uint64_t hash_of_arithmetic(uint64_t hash)
+PFL_NOINLINE static uint64_t hash_of_arithmetic(uint64_t hash)
 {
     volatile float one_and_bit = 1.00000012f;
     volatile float tiny = 1.17549435e-38f;
@@ -45,7 +45,7 @@ static uint64_t hash_of_arithmetic(uint64_t hash)
     return hash;
 }
 
-static uint64_t hash_of_math(uint64_t hash)
+PFL_NOINLINE static uint64_t hash_of_math(uint64_t hash)
 {
     volatile float start = -12.3f;
     float x = start;
@@ -64,7 +64,7 @@ static uint64_t hash_of_math(uint64_t hash)
     return hash;
 }
 
-static uint64_t hash_of_random(uint64_t hash, float *noise)
+PFL_NOINLINE static uint64_t hash_of_random(uint64_t hash, float *noise)
 {
     pfl_rng_t rng;
     pfl_rng_seed(&rng, 20260101u);
@@ -109,41 +109,48 @@ static void scatter(void *user, const pfl_batch_t *p)
     }
 }
 
-/* A short flight by each resampling scheme. */
-static pfl_status_t fly(void *arena, size_t arena_bytes, pfl_resampling_t scheme, uint64_t *hash)
+PFL_NOINLINE static pfl_status_t mix_answers(pfl_t *f, uint64_t *hash)
 {
-    const pfl_sensor_t sensor = {.loglik = bearing};
-    pfl_config_t config;
-    memset(&config, 0, sizeof config);
-    config.abi = PFL_ABI;
-    config.particles = SELF_TEST_PARTICLES;
-    config.states = 2u;
-    config.noises = 1u;
-    config.sensor_count = 1u;
-    config.resampling = (uint16_t)scheme;
-    config.circular_mask = 1u;
-    config.ess_ratio = 0.75f;
-    config.seed = 7u;
-    config.sensors = &sensor;
-    config.predict = drift;
-    config.draw = scatter;
+    float mean[2];
+    float cov[4];
+    const pfl_status_t status = pfl_estimate(f, mean, cov);
+    if (status == PFL_OK) {
+        mix(hash, mean[0]);
+        mix(hash, mean[1]);
+        mix(hash, cov[0]);
+        mix(hash, cov[1]);
+        mix(hash, cov[3]);
+        mix(hash, pfl_effective_sample_size(f));
+    }
+    return status;
+}
+
+/* A short flight by one resampling scheme. Its configuration lies behind its arena: the stack is for the filter. */
+PFL_NOINLINE static pfl_status_t fly(void *arena, pfl_resampling_t scheme, uint64_t *hash)
+{
+    static const pfl_sensor_t sensor = {.loglik = bearing};
+    const size_t arena_bytes = PFL_ARENA_BYTES(SELF_TEST_PARTICLES, 2, 2);
+    pfl_config_t *config = (pfl_config_t *)(void *)((unsigned char *)arena + arena_bytes);
+    memset(config, 0, sizeof *config);
+    config->abi = PFL_ABI;
+    config->particles = SELF_TEST_PARTICLES;
+    config->states = 2u;
+    config->noises = 1u;
+    config->sensor_count = 1u;
+    config->resampling = (uint16_t)scheme;
+    config->circular_mask = 1u;
+    config->ess_ratio = 0.75f;
+    config->seed = 7u;
+    config->sensors = &sensor;
+    config->predict = drift;
+    config->draw = scatter;
     pfl_t *f = NULL;
-    pfl_status_t status = pfl_init(arena, arena_bytes, &config, 0u, &f);
+    pfl_status_t status = pfl_init(arena, arena_bytes, config, 0u, &f);
     for (uint32_t k = 1u; (k <= SELF_TEST_STEPS) && (status == PFL_OK); k++) {
-        float mean[2];
-        float cov[4];
         const float z = 3.0f + (0.125f * (float)k);
         status = pfl_predict(f, k * 250000u, NULL);
         status = (status == PFL_OK) ? pfl_update(f, 0u, k * 250000u, &z) : status;
-        status = (status == PFL_OK) ? pfl_estimate(f, mean, cov) : status;
-        if (status == PFL_OK) {
-            mix(hash, mean[0]);
-            mix(hash, mean[1]);
-            mix(hash, cov[0]);
-            mix(hash, cov[1]);
-            mix(hash, cov[3]);
-            mix(hash, pfl_effective_sample_size(f));
-        }
+        status = (status == PFL_OK) ? mix_answers(f, hash) : status;
     }
     if (f != NULL) {
         f->alive = 0u; /* leave no filter behind whose configuration is gone */
@@ -164,7 +171,7 @@ pfl_status_t pfl_self_test(void *arena, size_t arena_bytes)
     const bool random = hash_of_random(seed, (float *)arena) == ANSWER_RANDOM;
     pfl_status_t status = PFL_OK;
     for (uint32_t scheme = 0u; (scheme <= (uint32_t)PFL_RESAMPLE_MULTINOMIAL) && (status == PFL_OK); scheme++) {
-        status = fly(arena, arena_bytes, (pfl_resampling_t)scheme, &flight);
+        status = fly(arena, (pfl_resampling_t)scheme, &flight);
     }
     const bool flown = (status == PFL_OK) && (flight == ANSWER_FLIGHT);
     return (arithmetic && math && random && flown) ? PFL_OK : PFL_ERR_SELF_TEST;

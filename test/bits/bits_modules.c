@@ -163,6 +163,7 @@ static void of_predictive_control(void)
         pfl_nmpc_plan_t plan;
         pfl_nmpc_path_t path;
         pfl_nmpc_path_t pair;
+        pfl_nmpc_work_t work;
         pfl_nmpc_report_t report = {0.0f, 0u};
         for (uint32_t j = 0u; j < PFL_NMPC_STEPS; j++) {
             plan.speed_mps[j] = 15.0f;
@@ -172,7 +173,7 @@ static void of_predictive_control(void)
         mix((float)pfl_nmpc_rollout(&nmpc, &other, &plan, &pair, NULL));
         mix((float)pfl_nmpc_extrapolate(&nmpc, &target, &path));
         const pfl_nmpc_problem_t problem = {uav, &path, (k % 3u) != 0u ? &pair : NULL, 45.0f};
-        mix((float)pfl_nmpc_solve(&nmpc, &problem, &plan, &report));
+        mix((float)pfl_nmpc_solve(&nmpc, &problem, &plan, &work, &report));
         mix(report.cost);
         mix((float)report.evaluations);
         for (uint32_t j = 0u; j < PFL_NMPC_STEPS; j++) {

@@ -137,6 +137,8 @@ void test_lvfg_refuses_bad_input_and_touches_nothing(void)
 
 /* ---- NMPC ------------------------------------------------------------------------------------------------------------ */
 
+static pfl_nmpc_work_t work;
+
 static pfl_nmpc_t page_nmpc(void)
 {
     return (pfl_nmpc_t){
@@ -197,14 +199,14 @@ void test_nmpc_cost_and_gradient_are_the_page_s(void)
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_extrapolate(&nmpc, &estimate, &target));
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_rollout(&nmpc, &pair[1], &plan, &other, NULL));
     const pfl_nmpc_problem_t problem = {pair[0], &target, &other, 36.0f};
-    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_cost(&nmpc, &problem, &plan, &cost, &gradient));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_cost(&nmpc, &problem, &plan, &work, &cost, &gradient));
     TEST_ASSERT_FLOAT_WITHIN(2e-4f, 149.452512f, cost);
     for (uint32_t k = 0u; k < PFL_NMPC_STEPS; k++) {
         TEST_ASSERT_FLOAT_WITHIN(1e-4f, speed[k], gradient.speed_mps[k]);
         TEST_ASSERT_FLOAT_WITHIN(4e-4f, turn[k], gradient.turn_radps[k]);
     }
     nmpc.phase_form = PFL_PHASE_DIRECTION;
-    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_cost(&nmpc, &problem, &plan, &cost, &gradient));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_cost(&nmpc, &problem, &plan, &work, &cost, &gradient));
     TEST_ASSERT_FLOAT_WITHIN(2e-4f, 152.643741f, cost);
     TEST_ASSERT_FLOAT_WITHIN(1e-4f, -2.233991f, gradient.speed_mps[0]);
     TEST_ASSERT_FLOAT_WITHIN(4e-4f, 168.587269f, gradient.turn_radps[0]);
@@ -247,7 +249,7 @@ static double cost_with(const situation_t *s, float *number, float value)
     float cost;
 
     *number = value;
-    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_cost(&s->nmpc, &s->problem, &s->plan, &cost, NULL));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_cost(&s->nmpc, &s->problem, &s->plan, &work, &cost, NULL));
     *number = before;
     return (double)cost;
 }
@@ -275,7 +277,7 @@ void test_nmpc_gradient_is_that_of_the_cost(void)
         float cost;
 
         make_situation(&s, run);
-        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_cost(&s.nmpc, &s.problem, &s.plan, &cost, &gradient));
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_cost(&s.nmpc, &s.problem, &s.plan, &work, &cost, &gradient));
         for (uint32_t k = 0u; k < PFL_NMPC_STEPS; k++) {
             check_slope(&s, &s.plan.speed_mps[k], 0.03f, gradient.speed_mps[k]);
             check_slope(&s, &s.plan.turn_radps[k], 0.01f, gradient.turn_radps[k]);
@@ -293,8 +295,8 @@ void test_nmpc_never_gets_worse_and_keeps_its_bound(void)
         float before;
 
         make_situation(&s, run);
-        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_cost(&s.nmpc, &s.problem, &s.plan, &before, NULL));
-        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_solve(&s.nmpc, &s.problem, &s.plan, &report));
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_cost(&s.nmpc, &s.problem, &s.plan, &work, &before, NULL));
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_solve(&s.nmpc, &s.problem, &s.plan, &work, &report));
         TEST_ASSERT_TRUE(report.cost <= before);
         TEST_ASSERT_TRUE(report.evaluations >= 1u + PFL_NMPC_ITERATIONS);
         TEST_ASSERT_TRUE(report.evaluations <= PFL_NMPC_EVALUATIONS_MAX);
@@ -319,7 +321,7 @@ void test_nmpc_worst_case_is_the_bound(void)
     nmpc.penalty = 1e12f;
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_extrapolate(&nmpc, &estimate, &target));
     const pfl_nmpc_problem_t problem = {pair[0], &target, NULL, 36.0f};
-    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_solve(&nmpc, &problem, &plan, &report));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_solve(&nmpc, &problem, &plan, &work, &report));
     TEST_ASSERT_EQUAL_UINT32(PFL_NMPC_EVALUATIONS_MAX, report.evaluations);
     TEST_ASSERT_EQUAL_UINT32(49u, report.evaluations);
     TEST_ASSERT_EQUAL_FLOAT(22.0f, plan.speed_mps[0]); /* kept, and clipped */
@@ -336,17 +338,18 @@ void test_nmpc_refuses_bad_input_and_touches_nothing(void)
 
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_extrapolate(&nmpc, &estimate, &target));
     pfl_nmpc_problem_t problem = {pair[0], &target, NULL, 36.0f};
-    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_solve(NULL, &problem, &plan, &report));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_solve(NULL, &problem, &plan, &work, &report));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_solve(&nmpc, &problem, &plan, NULL, &report));
     nmpc.lag_share = 0.0f;
-    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_solve(&nmpc, &problem, &plan, &report));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_solve(&nmpc, &problem, &plan, &work, &report));
     nmpc = page_nmpc();
     problem.distance_m = 0.0f;
-    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_solve(&nmpc, &problem, &plan, &report));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_solve(&nmpc, &problem, &plan, &work, &report));
     problem.distance_m = 36.0f;
     target.x_m[3] = (float)INFINITY;
-    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_solve(&nmpc, &problem, &plan, &report));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_solve(&nmpc, &problem, &plan, &work, &report));
     target.x_m[3] = 1e30f;
-    TEST_ASSERT_EQUAL_INT(PFL_ERR_NONFINITE, pfl_nmpc_solve(&nmpc, &problem, &plan, &report));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_NONFINITE, pfl_nmpc_solve(&nmpc, &problem, &plan, &work, &report));
     TEST_ASSERT_EQUAL_MEMORY(&before, &plan, sizeof plan);
     TEST_ASSERT_EQUAL_UINT32(0u, report.evaluations);
 }

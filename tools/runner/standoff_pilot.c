@@ -102,8 +102,9 @@ static bool plan_all(const standoff_study_t *s, const pfl_uav_t *uav, const pfl_
     for (unsigned i = 0u; i < s->uavs; i++) {
         const pfl_nmpc_problem_t problem = {uav[i], &ahead, s->uavs == 1u ? NULL : &path[1u - i],
                                             pilot->standoff.distance_m};
+        pfl_nmpc_work_t work;
         pfl_nmpc_report_t report;
-        if (!check(pfl_nmpc_solve(&nmpc, &problem, &pilot->plan[i], &report), "pfl_nmpc_solve", failure)) {
+        if (!check(pfl_nmpc_solve(&nmpc, &problem, &pilot->plan[i], &work, &report), "pfl_nmpc_solve", failure)) {
             return false;
         }
         pilot->calls++;

@@ -126,6 +126,11 @@ typedef struct {
     float distance_m;            /* rd, held over the horizon; > 0 */
 } pfl_nmpc_problem_t;
 
+/* Room for a solution on its way, kept off the stack; the caller's, and free again after the call. */
+typedef struct {
+    float numbers[(16u * PFL_NMPC_STEPS) + 8u];
+} pfl_nmpc_work_t;
+
 typedef struct {
     float cost;
     uint32_t evaluations; /* predictions made, at most PFL_NMPC_EVALUATIONS_MAX */
@@ -143,12 +148,12 @@ pfl_status_t pfl_nmpc_extrapolate(const pfl_nmpc_t *nmpc, const pfl_target_t *ta
 
 /* Cost of a plan, and its gradient (null: not wanted), laid out like the plan. */
 pfl_status_t pfl_nmpc_cost(const pfl_nmpc_t *nmpc, const pfl_nmpc_problem_t *problem, const pfl_nmpc_plan_t *plan,
-                           float *cost, pfl_nmpc_plan_t *gradient);
+                           pfl_nmpc_work_t *work, float *cost, pfl_nmpc_plan_t *gradient);
 
 /* Improves a plan (the one of the step before, shifted) and clips it to the limits; its first commands are to be flown.
  * report: may be null. */
 pfl_status_t pfl_nmpc_solve(const pfl_nmpc_t *nmpc, const pfl_nmpc_problem_t *problem, pfl_nmpc_plan_t *plan,
-                            pfl_nmpc_report_t *report);
+                            pfl_nmpc_work_t *work, pfl_nmpc_report_t *report);
 
 #ifdef __cplusplus
 }

@@ -511,7 +511,8 @@ WRAP(pfl_status_t, pfl_lvfg_command,
 }
 
 WRAP(pfl_status_t, pfl_nmpc_solve,
-     (const pfl_nmpc_t *nmpc, const pfl_nmpc_problem_t *problem, pfl_nmpc_plan_t *plan, pfl_nmpc_report_t *report))
+     (const pfl_nmpc_t *nmpc, const pfl_nmpc_problem_t *problem, pfl_nmpc_plan_t *plan, pfl_nmpc_work_t *work,
+      pfl_nmpc_report_t *report))
 {
     pfl_nmpc_report_t ours = {0.0f, 0u};
 
@@ -526,7 +527,7 @@ WRAP(pfl_status_t, pfl_nmpc_solve,
     }
     put_float(problem->distance_m);
     put_type(&tape_nmpc_plan, plan);
-    const pfl_status_t status = answer_status(__real_pfl_nmpc_solve(nmpc, problem, plan, &ours));
+    const pfl_status_t status = answer_status(__real_pfl_nmpc_solve(nmpc, problem, plan, work, &ours));
     answer_words(plan, sizeof *plan);
     answer_words(&ours, sizeof ours);
     if (report != NULL) {

@@ -52,6 +52,7 @@ bool play_nmpc_solve(play_t *p)
     pfl_nmpc_t nmpc;
     pfl_nmpc_path_t target, pair;
     pfl_nmpc_plan_t plan;
+    pfl_nmpc_work_t work;
     pfl_nmpc_report_t report = {0.0f, 0u};
     pfl_nmpc_problem_t problem;
     words_next_type(&tape_nmpc, &nmpc, 1.0f);
@@ -66,7 +67,7 @@ bool play_nmpc_solve(play_t *p)
     problem.distance_m = words_next_float();
     words_next_type(&tape_nmpc_plan, &plan, 1.0f);
     PLAY_MARK(mark);
-    const pfl_status_t status = pfl_nmpc_solve(&nmpc, &problem, &plan, &report);
+    const pfl_status_t status = pfl_nmpc_solve(&nmpc, &problem, &plan, &work, &report);
     const uint32_t stop = pfl_port_cycles();
     play_count(p, TAPE_NMPC_SOLVE, mark, stop);
     words_put(IO_OUT, (uint32_t)(int32_t)status);
