@@ -25,13 +25,13 @@ void pfl_odometry_predict(void *user, const void *u, float dt_s, const pfl_batch
     const float *restrict w_x = PFL_NOISE(p, 2);
     const float *restrict w_y = PFL_NOISE(p, 3);
     for (uint32_t i = 0u; i < p->n; i++) {
-        float s;
-        float c;
+        float to_x;
+        float to_y;
         const float moved = way + (way_spread * w_way[i]);
         const float turned = turn + (turn_spread * w_turn[i]);
-        pfl_sincos_kernel(heading[i] + (0.5f * turned), &s, &c);
-        x[i] += (moved * c) + (spread * w_x[i]);
-        y[i] += (moved * s) + (spread * w_y[i]);
+        pfl_way_kernel(moved, heading[i] + (0.5f * turned), &to_x, &to_y);
+        x[i] += to_x + (spread * w_x[i]);
+        y[i] += to_y + (spread * w_y[i]);
         heading[i] += turned;
     }
 }

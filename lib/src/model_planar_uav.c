@@ -16,15 +16,15 @@ static void move(const pfl_batch_t *p, const pfl_planar_uav_input_t *in, float h
     const float speed_command = in->speed_mps;
     const float turn_command = in->turn_radps;
     for (uint32_t i = 0u; i < p->n; i++) {
-        float s;
-        float c;
+        float to_x;
+        float to_y;
         const float faster = speed_command + ((speed[i] - speed_command) * keep);
         const float tighter = turn_command + ((turn[i] - turn_command) * keep);
         const float way = h_s * (0.5f * (speed[i] + faster));
         const float turned = h_s * (0.5f * (turn[i] + tighter));
-        pfl_sincos_kernel(heading[i] + (0.5f * turned), &s, &c);
-        x[i] += way * c;
-        y[i] += way * s;
+        pfl_way_kernel(way, heading[i] + (0.5f * turned), &to_x, &to_y);
+        x[i] += to_x;
+        y[i] += to_y;
         heading[i] += turned;
         speed[i] = faster;
         turn[i] = tighter;
@@ -42,12 +42,11 @@ static void leap(const pfl_batch_t *p, const pfl_planar_uav_input_t *in, float d
     const float speed_command = in->speed_mps;
     const float turn_command = in->turn_radps;
     for (uint32_t i = 0u; i < p->n; i++) {
-        float s;
-        float c;
-        const float way = dt_s * speed[i];
-        pfl_sincos_kernel(heading[i], &s, &c);
-        x[i] += way * c;
-        y[i] += way * s;
+        float to_x;
+        float to_y;
+        pfl_way_kernel(dt_s * speed[i], heading[i], &to_x, &to_y);
+        x[i] += to_x;
+        y[i] += to_y;
         heading[i] += dt_s * turn[i];
         speed[i] += share * (speed_command - speed[i]);
         turn[i] += share * (turn_command - turn[i]);

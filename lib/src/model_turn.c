@@ -57,13 +57,12 @@ static void move(float dt_s, const pfl_batch_t *p)
     const float *restrict speed = PFL_STATE(p, PFL_TURN_SPEED);
     const float *restrict rate = PFL_STATE(p, PFL_TURN_RATE);
     for (uint32_t i = 0u; i < p->n; i++) {
-        float s;
-        float c;
+        float to_x;
+        float to_y;
         const float turned = dt_s * rate[i];
-        const float way = dt_s * speed[i];
-        pfl_sincos_kernel(heading[i] + (0.5f * turned), &s, &c);
-        x[i] += way * c;
-        y[i] += way * s;
+        pfl_way_kernel(dt_s * speed[i], heading[i] + (0.5f * turned), &to_x, &to_y);
+        x[i] += to_x;
+        y[i] += to_y;
         heading[i] += turned;
     }
 }

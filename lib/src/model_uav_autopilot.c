@@ -103,12 +103,12 @@ static void move_plane(const pfl_autopilot_t *m, float speed_mps, float dt_s, co
     float *restrict speed = PFL_STATE(p, PFL_AUTOPILOT_SPEED);
     float *restrict heading = PFL_STATE(p, PFL_AUTOPILOT_HEADING);
     for (uint32_t i = 0u; i < p->n; i++) {
-        float s;
-        float c;
+        float along_x;
+        float along_y;
         const float v = speed[i];
-        pfl_sincos_kernel(heading[i], &s, &c);
-        x[i] += dt_s * ((v * c) + wind->x_mps[i]);
-        y[i] += dt_s * ((v * s) + wind->y_mps[i]);
+        pfl_way_kernel(v, heading[i], &along_x, &along_y);
+        x[i] += dt_s * (along_x + wind->x_mps[i]);
+        y[i] += dt_s * (along_y + wind->y_mps[i]);
         heading[i] += dt_s * clip(alpha_heading * error[i], -turn_max, turn_max);
         speed[i] = clip(v + (accelerate * (speed_mps - v)), slowest, fastest);
     }

@@ -1,4 +1,4 @@
-/* One step of xoshiro128++ 1.0 (Blackman and Vigna, 2021). */
+/* One step of xoshiro128 1.0 (Blackman and Vigna, 2021) and what it gives. */
 #ifndef PFL_RNG_KERNELS_H
 #define PFL_RNG_KERNELS_H
 
@@ -11,9 +11,8 @@ static inline uint32_t pfl_rotl(uint32_t x, uint32_t k)
     return (x << k) | (x >> (32u - k));
 }
 
-static inline uint32_t pfl_xoshiro_next(uint32_t s[4])
+static inline void pfl_xoshiro_step(uint32_t s[4])
 {
-    const uint32_t result = pfl_rotl(s[0] + s[3], 7u) + s[0];
     const uint32_t t = s[1] << 9;
     s[2] ^= s[0];
     s[3] ^= s[1];
@@ -21,6 +20,21 @@ static inline uint32_t pfl_xoshiro_next(uint32_t s[4])
     s[0] ^= s[3];
     s[2] ^= t;
     s[3] = pfl_rotl(s[3], 11u);
+}
+
+/* xoshiro128++: every bit is good. */
+static inline uint32_t pfl_xoshiro_next(uint32_t s[4])
+{
+    const uint32_t result = pfl_rotl(s[0] + s[3], 7u) + s[0];
+    pfl_xoshiro_step(s);
+    return result;
+}
+
+/* xoshiro128+, which its authors made for floats: the lowest few bits follow linear rules, and rounding drops them. */
+static inline uint32_t pfl_xoshiro_next_upper(uint32_t s[4])
+{
+    const uint32_t result = s[0] + s[3];
+    pfl_xoshiro_step(s);
     return result;
 }
 

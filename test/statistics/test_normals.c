@@ -12,6 +12,8 @@
 #define GROUP (2u * PFL_RNG_LANES)
 #define FINE 1000000u /* equal shares of probability for the Kolmogorov-Smirnov test */
 #define COARSE 1000u  /* and for the chi-square test */
+#define SIDE 32u      /* parts of radius and angle in the test of their independence */
+#define WINDOWS 5u    /* into their bits */
 #define SIGMAS 5.0
 
 static float *z;
@@ -136,6 +138,79 @@ void test_successive_normals_are_uncorrelated(void)
     assert_uncorrelated(64u, false, "successive batches");
 }
 
+/* Five standard deviations either way, after Wilson and Hilferty's cube root. */
+static void assert_chi_square(double sum, double freedom, const char *what)
+{
+    const double spread = 2.0 / (9.0 * freedom);
+    TEST_ASSERT_TRUE_MESSAGE(sum < (freedom * pow((1.0 - spread) + (SIGMAS * sqrt(spread)), 3.0)), what);
+    TEST_ASSERT_TRUE_MESSAGE(sum > (freedom * pow((1.0 - spread) - (SIGMAS * sqrt(spread)), 3.0)), what);
+}
+
+/* Two uniform numbers of a pair, if it is what it should be: of its radius, and of its angle. */
+static void uniforms_of_pair(uint32_t pair, double *of_radius, double *of_angle)
+{
+    const uint32_t i = ((pair / PFL_RNG_LANES) * GROUP) + (pair % PFL_RNG_LANES);
+    const double x = (double)z[i];
+    const double y = (double)z[i + PFL_RNG_LANES];
+    *of_radius = exp(-0.5 * ((x * x) + (y * y)));
+    *of_angle = (atan2(y, x) * 0.159154943091895336) + 0.5;
+}
+
+/* Which of SIDE equal parts of the unit interval u is in, when only its bits after the first `skip` are looked at. */
+static uint32_t part(double u, uint32_t skip)
+{
+    const double scaled = u * (double)(1u << skip);
+    const uint32_t k = (uint32_t)((scaled - floor(scaled)) * SIDE);
+    return (k < SIDE) ? k : (SIDE - 1u);
+}
+
+/* Radius and angle are independent, also where one shows its leading bits and the other some later ones: an angle made
+ * from the radius' bits, however shifted, does not pass. Windows of five bits overlap by one. */
+void test_radius_and_angle_are_independent(void)
+{
+    static double cells[2u * WINDOWS][SIDE * SIDE];
+    const double expected = (COUNT / 2.0) / (SIDE * SIDE);
+    memset(cells, 0, sizeof cells);
+    for (uint32_t pair = 0u; pair < (COUNT / 2u); pair++) {
+        double of_radius;
+        double of_angle;
+        uniforms_of_pair(pair, &of_radius, &of_angle);
+        for (uint32_t w = 0u; w < WINDOWS; w++) {
+            cells[w][(part(of_radius, 0u) * SIDE) + part(of_angle, 4u * w)] += 1.0;
+            cells[WINDOWS + w][(part(of_radius, 4u * w) * SIDE) + part(of_angle, 0u)] += 1.0;
+        }
+    }
+    for (uint32_t w = 0u; w < (2u * WINDOWS); w++) {
+        double sum = 0.0;
+        for (uint32_t k = 0u; k < (SIDE * SIDE); k++) {
+            sum += ((cells[w][k] - expected) * (cells[w][k] - expected)) / expected;
+        }
+        assert_chi_square(sum, (SIDE * SIDE) - 1.0, "radius and angle share bits");
+    }
+}
+
+/* The radius comes from one polynomial for every octave of its uniform number: ten octaves in eight parts each, and all
+ * beyond. 80 degrees of freedom; at least 400 pairs a cell are expected. */
+void test_every_octave_of_the_radius_has_its_share(void)
+{
+    double cells[81];
+    double sum = 0.0;
+    memset(cells, 0, sizeof cells);
+    for (uint32_t pair = 0u; pair < (COUNT / 2u); pair++) {
+        double of_radius;
+        double of_angle;
+        uniforms_of_pair(pair, &of_radius, &of_angle);
+        const double eighths = -8.0 * log2(of_radius);
+        cells[(eighths < 80.0) ? (uint32_t)eighths : 80u] += 1.0;
+    }
+    for (uint32_t k = 0u; k < 81u; k++) {
+        const double beyond = (k < 80u) ? pow(0.5, (k + 1.0) / 8.0) : 0.0;
+        const double expected = (COUNT / 2.0) * (pow(0.5, k / 8.0) - beyond);
+        sum += ((cells[k] - expected) * (cells[k] - expected)) / expected;
+    }
+    assert_chi_square(sum, 80.0, "octaves of the radius");
+}
+
 static void count_beyond(double limit, double *above, double *below)
 {
     *above = 0.0;
@@ -160,7 +235,7 @@ void test_tails(void)
     /* Beyond 5 sigma 5.73 are expected, Poisson: 22 or more have odds of 2e-7, and none has 3e-3. */
     count_beyond(5.0, &above, &below);
     TEST_ASSERT_TRUE_MESSAGE((above + below) < 22.0, "too many beyond 5 sigma");
-    count_beyond(6.67, &above, &below); /* rng.h: |z| <= 6.66 */
+    count_beyond(6.56, &above, &below); /* rng.h: |z| < 6.56 */
     TEST_ASSERT_TRUE_MESSAGE((above + below) < 0.5, "beyond the stated end of the distribution");
 }
 

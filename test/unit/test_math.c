@@ -4,6 +4,7 @@
 
 #include "pflight/math.h"
 
+#include "../../lib/src/math_kernels.h"
 #include "../../lib/src/sqrt_kernel.h"
 
 #include "unity.h"
@@ -345,4 +346,34 @@ void test_one_function_gives_sine_and_cosine_of_the_two(void)
         is_exactly(pfl_cosf(x), c);
         is_exactly(s / c, pfl_tanf(x));
     }
+}
+
+/* The models' way: right to 1.1e-6 of its length, at a heading within one ULP (1.2e-7) of the given one. */
+void test_way_kernel(void)
+{
+    uint64_t dice = 11u;
+    for (uint32_t k = 0u; k < 300000u; k++) {
+        float x;
+        float y;
+        const float u = (float)(int32_t)ut_random(&dice) * 4.65661287e-10f;
+        const float span = (k % 3u == 0u) ? 3.2f : ((k % 3u == 1u) ? 100.0f : 1.0e6f);
+        const float heading = span * u;
+        const float length = 40.0f * (float)(int32_t)ut_random(&dice) * 4.65661287e-10f;
+        pfl_way_kernel(length, heading, &x, &y);
+        const double allowed = fabs((double)length) * (1.1e-6 + (1.2e-7 * fabs((double)heading)));
+        TEST_ASSERT_DOUBLE_WITHIN(allowed, (double)length * cos((double)heading), (double)x);
+        TEST_ASSERT_DOUBLE_WITHIN(allowed, (double)length * sin((double)heading), (double)y);
+    }
+}
+
+void test_way_kernel_keeps_a_nan(void)
+{
+    float x;
+    float y;
+    pfl_way_kernel(1.0f, ut_nan(false), &x, &y);
+    is_nan(x);
+    is_nan(y);
+    pfl_way_kernel(ut_nan(false), 1.0f, &x, &y);
+    is_nan(x);
+    is_nan(y);
 }

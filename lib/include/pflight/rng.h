@@ -29,8 +29,9 @@ void pfl_rng_long_jump(pfl_rng_t *rng);
 /* Next 32 uniform bits of the ninth stream. O(1). */
 uint32_t pfl_rng_u32(pfl_rng_t *rng);
 
-/* Fills out[0 .. groups*16-1] with standard normals (Box and Muller 1958; |z| < 6.67). In each group of 16, lane l
- * makes elements l and l+8 from its next two numbers. O(groups). */
+/* Fills out[0 .. groups*16-1] with standard normals (Box and Muller 1958; |z| < 6.56). In each group of 16, lane l
+ * makes elements l and l+8: the radius from its next number, the angle from the one after, taken as xoshiro128+ gives it.
+ * O(groups). */
 void pfl_rng_normals(pfl_rng_t *rng, float *out, size_t groups);
 
 #ifdef __cplusplus
