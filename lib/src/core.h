@@ -63,25 +63,26 @@ typedef struct {
     uint32_t unused;
 } pfl_sensor_track_t;
 
-/* In three parts, of which guard.c keeps watch: what no callback lives to see changed, what a call changes, and what is
- * its own guard. */
+/* In parts, as guard.c looks at them: what the loops over batches live on, what else no callback lives to see changed,
+ * what a call changes, and the guard's own. */
 struct pfl {
     uint32_t alive;
     uint32_t stride;
     const pfl_config_t *config;
+    float *lanes;      /* eight partial sums of each moment; saved particles during a predict */
+    float *work;       /* PFL_BATCH x (max(D, Q) + 1) */
+    float *x;          /* D columns of `stride` */
+    float *log_weight; /* column */
+    float *scratch;    /* column */
+    float *best;       /* D: state of the most likely particle */
+    float *retry;      /* PFL_BATCH x 2 D: a batch before its move, and a new attempt; null without retries */
+
     float *mean;                /* D */
-    float *best;                /* D: state of the most likely particle */
     float *centre;              /* D: what moments are taken about */
     float *delta;               /* D: jump of the mean at the last reset */
     float *cov;                 /* D (D + 1) / 2, upper triangle row by row */
     float *kernel_mean;         /* D: mean of the resampled cloud */
     float *kernel_cov;          /* D (D + 1) / 2: its covariance, then the root of it */
-    float *lanes;               /* eight partial sums of each moment; saved particles during a predict */
-    float *work;                /* PFL_BATCH x (max(D, Q) + 1) */
-    float *x;                   /* D columns of `stride` */
-    float *log_weight;          /* column */
-    float *scratch;             /* column */
-    float *retry;               /* PFL_BATCH x 2 D: a batch before its move, and a new attempt; null without retries */
     pfl_sensor_track_t *sensor; /* sensor_count; null without a watch */
     uint32_t config_hash, parts_hash, limits_hash;
     uint64_t t_us;
@@ -148,7 +149,7 @@ typedef struct {
     uint32_t top_first; /* batch that holds it */
 } pfl_weigh_t;
 void pfl_weigh_start(pfl_weigh_t *w, bool gated);
-void pfl_weigh_batch(const pfl_t *f, uint32_t first, uint32_t n, float *ll, pfl_weigh_t *w);
+void pfl_weigh_batch(const pfl_t *f, uint32_t first, uint32_t n, const float *ll, pfl_weigh_t *w); /* into scratch */
 void pfl_weights_equal(pfl_t *f);
 void pfl_weights_settle(pfl_t *f); /* before the column of log-weights is read or changed: it holds them from now on */
 void pfl_weights_after_loss(pfl_t *f); /* some particles lost theirs: a new top, or equal ones if none is left */

@@ -4,7 +4,7 @@
 #include "rng_kernels.h"
 #include "sqrt_kernel.h"
 
-static pfl_status_t estimate(pfl_t *f, float *mean, float *cov)
+static pfl_status_t copy_moments(const pfl_t *f, float *mean, float *cov)
 {
     const uint32_t states = f->config->states;
     if (mean == NULL) {
@@ -12,10 +12,6 @@ static pfl_status_t estimate(pfl_t *f, float *mean, float *cov)
     }
     if ((cov != NULL) && (f->config->moments != (uint16_t)PFL_MOMENTS_FULL)) {
         return PFL_ERR_CONFIG;
-    }
-    pfl_refresh(f);
-    if (f->moments_current == MOMENTS_OVERFLOWED) {
-        return pfl_fault(f, PFL_ERR_NONFINITE);
     }
     memcpy(mean, f->mean, sizeof(float) * states);
     const float *upper = f->cov;
@@ -29,8 +25,17 @@ static pfl_status_t estimate(pfl_t *f, float *mean, float *cov)
     return PFL_OK;
 }
 
+static pfl_status_t estimate(pfl_t *f, float *mean, float *cov)
+{
+    pfl_refresh(f);
+    return (f->moments_current == MOMENTS_OVERFLOWED) ? pfl_fault(f, PFL_ERR_NONFINITE) : copy_moments(f, mean, cov);
+}
+
 pfl_status_t pfl_estimate(pfl_t *f, float *mean, float *cov)
 {
+    if ((pfl_enter(f) == PFL_OK) && (f->moments_current == MOMENTS_CURRENT)) {
+        return copy_moments(f, mean, cov); /* nothing changes, so nothing needs a new seal */
+    }
     const pfl_status_t entered = pfl_begin(f);
     return (entered == PFL_OK) ? pfl_end(f, estimate(f, mean, cov)) : entered;
 }

@@ -23,6 +23,7 @@ pfl_status_t pfl_draw_prior(pfl_t *f)
         }
         pfl_clip_to_box(f, first, n);
     }
+    pfl_guard_after_batches(f);
     f->best_index = 0u;
     for (uint32_t d = 0u; d < f->config->states; d++) {
         f->best[d] = f->x[(size_t)d * f->stride];
@@ -134,13 +135,19 @@ PFL_NOINLINE static pfl_status_t weigh(pfl_t *f, const pfl_sensor_t *sensor, con
         if (pfl_meter_spent(f)) {
             return PFL_ERR_BUDGET;
         }
-        const pfl_view_t view = {&f->x[first], f->stride, first, n};
+        const pfl_view_t view = pfl_guard_view(f, first, n);
+        float *ll = pfl_guard_bay(f, n);
         f->busy = 1u;
-        sensor->loglik(user, z, &view, &f->scratch[first]);
+        sensor->loglik(user, z, &view, ll);
         f->busy = 0u;
         pfl_guard_after_callback(f);
-        pfl_weigh_batch(f, first, n, &f->scratch[first], w);
+        if (!pfl_guard_bay_is_whole(ll, n)) {
+            f->watched.event |= PFL_EVENT_MENDED;
+            return PFL_ERR_CORRUPT;
+        }
+        pfl_weigh_batch(f, first, n, ll, w);
     }
+    pfl_guard_after_batches(f);
     return PFL_OK;
 }
 

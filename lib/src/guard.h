@@ -38,7 +38,15 @@ pfl_status_t pfl_guard_close(pfl_t *f, pfl_status_t status);
 /* A new filter's hash of its configuration, canaries and seal. */
 void pfl_guard_start(pfl_t *f);
 
-/* After a callback: the pointers and sizes that never change, from the copy where they did. */
+/* What callbacks must not see changed is taken from the copy where it was: after each callback what the loop over the
+ * batches lives on, and after the last one all of it. */
 void pfl_guard_after_callback(pfl_t *f);
+void pfl_guard_after_batches(pfl_t *f);
+
+/* What a log-likelihood callback may read and write: a copy of the particles, and a bay of the workspace filled with NaN,
+ * so that what it leaves out does not pass for an answer. */
+pfl_view_t pfl_guard_view(pfl_t *f, uint32_t first, uint32_t n);
+float *pfl_guard_bay(pfl_t *f, uint32_t n);
+bool pfl_guard_bay_is_whole(const float *bay, uint32_t n); /* nothing was written behind the n-th */
 
 #endif

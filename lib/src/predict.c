@@ -159,6 +159,7 @@ PFL_NOINLINE static pfl_status_t step(pfl_t *f, const void *u, float dt_s, bool 
         first += n;
         n = ((count - first) < PFL_BATCH) ? (count - first) : PFL_BATCH;
     }
+    pfl_guard_after_batches(f);
     return PFL_OK;
 }
 

@@ -89,6 +89,7 @@ void pfl_reinject(pfl_t *f, uint32_t sensor, const void *z)
         (void)pfl_quarantine(f, first, n);
         pfl_clip_to_box(f, first, n);
     }
+    pfl_guard_after_batches(f);
     pfl_weights_equal(f);
     (void)pfl_moments(f, false);
     account(f, PFL_EVENT_REINJECTED);

@@ -26,8 +26,8 @@ void pfl_weigh_start(pfl_weigh_t *w, bool gated)
 
 /* Three forms of one loop. Where the weights are equal there is nothing to add, and the best log-likelihood is the
  * largest log-weight; where there is no gate nobody asks for it. */
-static inline int32_t weigh(const float *restrict old, float old_top, uint32_t n, float *restrict ll, pfl_weigh_t *w,
-                            bool equal, bool gated)
+static inline int32_t weigh(const float *restrict old, float old_top, uint32_t n, const float *restrict ll,
+                            float *restrict log_weight, pfl_weigh_t *w, bool equal, bool gated)
 {
     int32_t worst = w->worst_bits;
     int32_t best = w->best_bits;
@@ -37,7 +37,7 @@ static inline int32_t weigh(const float *restrict old, float old_top, uint32_t n
         const float s = equal ? y : ((old[i] - old_top) + y);
         const int32_t y_bits = pfl_bits(y);
         const int32_t s_bits = pfl_bits(s);
-        ll[i] = s;
+        log_weight[i] = s;
         worst = (y_bits > worst) ? y_bits : worst;
         best = (gated && (y_bits < best)) ? y_bits : best;
         top = (s_bits < top) ? s_bits : top;
@@ -47,18 +47,19 @@ static inline int32_t weigh(const float *restrict old, float old_top, uint32_t n
     return top;
 }
 
-void pfl_weigh_batch(const pfl_t *f, uint32_t first, uint32_t n, float *ll, pfl_weigh_t *w)
+void pfl_weigh_batch(const pfl_t *f, uint32_t first, uint32_t n, const float *ll, pfl_weigh_t *w)
 {
     const float *old = &f->log_weight[first];
+    float *log_weight = &f->scratch[first];
     int32_t top;
     if (f->weights_equal != 0u) {
-        top = weigh(old, 0.0f, n, ll, w, true, false);
+        top = weigh(old, 0.0f, n, ll, log_weight, w, true, false);
     } else if (w->gated != 0u) {
-        top = weigh(old, f->log_weight_top, n, ll, w, false, true);
+        top = weigh(old, f->log_weight_top, n, ll, log_weight, w, false, true);
     } else {
-        top = weigh(old, f->log_weight_top, n, ll, w, false, false);
+        top = weigh(old, f->log_weight_top, n, ll, log_weight, w, false, false);
     }
-    pad(&ll[n], (uint32_t)PFL_CEIL8(n) - n);
+    pad(&log_weight[n], (uint32_t)PFL_CEIL8(n) - n);
     if (top < w->top_bits) {
         w->top_bits = top;
         w->top_first = first;
