@@ -114,7 +114,7 @@ static const work_t *find_work(const char *name)
     }
     const unsigned long states = (strncmp(name, "chain-", 6u) == 0) ? strtoul(name + 6, NULL, 10) : 0u;
     return ((states >= 2u) && (states <= PFL_STATES_MAX) && ((states % 2u) == 0u)) ? work_chain((uint16_t)states)
-                                                                                    : NULL;
+                                                                                   : NULL;
 }
 
 static void measure(flight_t *flight, uint32_t repeats, bool timed)

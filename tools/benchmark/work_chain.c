@@ -57,8 +57,8 @@ const work_t *work_chain(uint16_t states)
     float noise[PFL_BATCH * WORK_MEASURED_MAX];
     const pfl_batch_t truth = {x, 1u, noise, 0u, 1u};
     pfl_rng_t rng;
-    work = (work_t){states,      (uint16_t)(states / 2u), move,     NULL,       see,
-                    &work.states, &work.states,           no_input, measured_at};
+    work =
+        (work_t){states, (uint16_t)(states / 2u), move, NULL, see, &work.states, &work.states, no_input, measured_at};
     pfl_rng_seed(&rng, 2026u);
     for (uint32_t k = 0u; k < WORK_STEPS_MAX; k++) {
         pfl_rng_normals(&rng, noise, (sizeof noise / sizeof noise[0]) / 16u);

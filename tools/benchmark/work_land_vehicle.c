@@ -41,9 +41,9 @@ static const float *measured_at(uint32_t k)
 
 const work_t *work_land_vehicle(void)
 {
-    static const work_t work = {PFL_LAND_STATES,     2u,       pfl_land_vehicle_predict, draw,
-                                pfl_position_loglik, &vehicle, &seen,                    input_of,
-                                measured_at};
+    static const work_t work = {
+        PFL_LAND_STATES, 2u,         pfl_land_vehicle_predict, draw, pfl_position_loglik, &vehicle, &seen,
+        input_of,        measured_at};
     float noise[PFL_BATCH * 3u]; /* truth and measurements, by the library's own model on a batch of one */
     float x[PFL_LAND_STATES];
     const pfl_batch_t truth = {x, 1u, noise, 0u, 1u};
