@@ -16,10 +16,12 @@ KERNEL(uniform_lanes)
 {
     uint32_t s[4][PFL_RNG_LANES]; /* a copy, as in the generator of normals */
     memcpy(s, kernel_data.rng.s, sizeof s);
-    for (uint32_t i = 0u; i < KERNEL_N; i += PFL_RNG_LANES) {
-        for (uint32_t l = 0u; l < PFL_RNG_LANES; l++) {
+    for (uint32_t i = 0u; i < KERNEL_N; i += 2u * PFL_RNG_LANES) {
+        for (uint32_t l = 0u; l < PFL_RNG_LANES;
+             l++) { /* two a lane, as there: a shorter loop is unrolled to scalars */
             uint32_t one[4] = {s[0][l], s[1][l], s[2][l], s[3][l]};
             kernel_data.bits[i + l] = pfl_xoshiro_next(one);
+            kernel_data.bits[i + PFL_RNG_LANES + l] = pfl_xoshiro_next(one);
             s[0][l] = one[0];
             s[1][l] = one[1];
             s[2][l] = one[2];
