@@ -59,6 +59,7 @@ set(PFLIGHT_LIB_HEADERS
   guidance.h
   math.h
   models.h
+  per_particle.h
   port.h
   rng.h
   sensors.h

@@ -35,7 +35,8 @@ typedef struct {
     void kernel_##name(void);                                                                                          \
     __attribute__((noinline)) void kernel_##name(void)
 
-extern const kernel_t kernels_math[], kernels_models[], kernels_sensors[], kernels_filter[];
-extern const uint32_t kernels_math_count, kernels_models_count, kernels_sensors_count, kernels_filter_count;
+extern const kernel_t kernels_math[], kernels_models[], kernels_sensors[], kernels_per_particle[], kernels_filter[];
+extern const uint32_t kernels_math_count, kernels_models_count, kernels_sensors_count, kernels_per_particle_count,
+    kernels_filter_count;
 
 #endif

@@ -7,6 +7,7 @@
 #include "pflight/guidance.h"
 #include "pflight/math.h"
 #include "pflight/models.h"
+#include "pflight/per_particle.h"
 #include "pflight/port.h"
 #include "pflight/rng.h"
 #include "pflight/sensors.h"
