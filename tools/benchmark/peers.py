@@ -11,7 +11,6 @@ import re
 import shutil
 import subprocess
 
-import documents
 import measure
 from measure import OUT, ROOT, Failure
 
@@ -69,7 +68,6 @@ LEFT_OUT = ("Beluga, tbrown122387/pf, nav2's AMCL, mikropf and other filters tha
 
 def add_options(parser):
     parser.add_argument("--no-install", action="store_true", help="use what is there; what is missing is marked")
-    parser.add_argument("--update-docs", action="store_true", help="write the table into docs/performance.md")
     measure.add_json(parser)
 
 
@@ -122,7 +120,8 @@ def python_version(peer, allowed, log):
 
 
 def build_rust(peer, allowed, log):
-    measure.need("cargo", "peers, or rustup")
+    if shutil.which("cargo") is None:
+        raise Failure("cargo is missing (multicalc needs Rust 1.85; Debian 12's is older)")
     folder, target = WORK / "multicalc", WORK / "multicalc" / f"target-{peer.rust}"
     shutil.copytree(HERE / "multicalc", folder, dirs_exist_ok=True)
     command = ["cargo", "build", "--release", "--target-dir", target]
@@ -253,7 +252,5 @@ def show(result):
 
 def run(options):
     result = figures(options)
-    if options.update_docs:
-        documents.write("peers", table(result))
     measure.deliver(result, options, show)
     return 0 if all(row["missing"] or row["same_work"] for row in result["peers"].values()) else 1

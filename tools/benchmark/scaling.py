@@ -2,7 +2,6 @@
 
 By N: the reference work (land vehicle, 4 states), 20 cycles. By states: a linear chain of masses, 1000 particles, 100
 cycles, half of the states seen. Flat means: from N = 300 to 100 000 at most 1.2 times the least."""
-import documents
 import host
 import measure
 
@@ -14,7 +13,6 @@ STATES = range(2, 17, 2)
 
 def add_options(parser):
     parser.add_argument("--max-particles", type=measure.particles, default=NUMBERS[-1], metavar="N", help="leave larger ones out")
-    parser.add_argument("--update-docs", action="store_true", help="write the tables into docs/performance.md")
     measure.add_build(parser)
     measure.add_json(parser)
 
@@ -76,7 +74,5 @@ def show(result):
 
 def run(options):
     result = figures(options)
-    if options.update_docs:
-        documents.write("scaling", table(result))
     measure.deliver(result, options, show)
     return 0
