@@ -231,7 +231,7 @@ def table(result):
     head = ["filter", "instructions", "ns", "RMSE [m]", "resampling", "what, and of which version"]
     lines = ["| " + " | ".join(head) + " |", "|" + "---|" * len(head)]
     lines += ["| " + " | ".join(cells(name, row)) + " |" for name, row in result["peers"].items()]
-    lines += ["", "; ".join(summary(result)).capitalize() + ". " + LEFT_OUT, "",
+    lines += ["", ". ".join(line[0].upper() + line[1:] for line in summary(result)) + ". " + LEFT_OUT, "",
               "`tools/bench peers` installed, built, ran and counted these: `gcc -std=gnu99 -O3 -march=x86-64-v3`, "
               "`g++ -std=c++17 -O3 -march=x86-64-v3`, `RUSTFLAGS=\"-C target-cpu=x86-64-v3\" cargo build --release` with LTO, "
               f"`pip install -r tools/benchmark/peers/requirements.txt`; then `PROGRAM work.txt {PARTICLES} {FLIGHTS} 5` in "
