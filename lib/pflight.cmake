@@ -64,6 +64,7 @@ set(PFLIGHT_LIB_HEADERS
   health.h
   math.h
   models.h
+  per_particle.h
   port.h
   rng.h
   sensors.h

@@ -8,6 +8,7 @@
 #include "pflight/health.h"
 #include "pflight/math.h"
 #include "pflight/models.h"
+#include "pflight/per_particle.h"
 #include "pflight/port.h"
 #include "pflight/rng.h"
 #include "pflight/sensors.h"
