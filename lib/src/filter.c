@@ -66,6 +66,13 @@ pfl_status_t pfl_init(void *arena, size_t arena_bytes, const pfl_config_t *confi
 
 /* ---- Predict -------------------------------------------------------------------------------------------------- */
 
+/* Found before anything is begun: a refusal leaves the cycle's count alone too. */
+static bool is_gap(const pfl_t *f, uint64_t dt_us)
+{
+    const uint64_t longest = f->config->dt_max_us;
+    return (dt_us > UINT32_MAX) || ((longest != 0u) && (dt_us > (longest * PFL_SUBSTEPS_MAX)));
+}
+
 pfl_status_t pfl_predict(pfl_t *f, uint64_t t_us, const void *u)
 {
     const pfl_status_t entered = pfl_begin(f);
@@ -78,7 +85,7 @@ pfl_status_t pfl_predict(pfl_t *f, uint64_t t_us, const void *u)
     if (t_us == f->t_us) {
         return PFL_OK;
     }
-    if ((t_us - f->t_us) > UINT32_MAX) {
+    if (is_gap(f, t_us - f->t_us)) {
         return PFL_ERR_GAP;
     }
     pfl_meter_begin(f);
