@@ -86,7 +86,7 @@ pfl_status_t pfl_farthest(const pfl_t *f, uint16_t x_state, uint16_t y_state, fl
         const float square = (dx * dx) + (dy * dy);
         farthest = (square > farthest) ? square : farthest;
     }
-    *distance = pfl_sqrt_kernel(farthest);
+    *distance = pfl_is_finite(farthest) ? pfl_sqrt_kernel(farthest) : FLT_MAX;
     return PFL_OK;
 }
 

@@ -242,8 +242,8 @@ float pfl_effective_sample_size(const pfl_t *f);
  * PFL_ERR_CORRUPT. O(1), O(N) with weights. */
 pfl_status_t pfl_particles(const pfl_t *f, pfl_view_t *view, float *log_weights);
 
-/* Largest distance of a particle from the point (x, y), in the plane of two states: the reach of the cloud. PFL_OK,
- * PFL_ERR_ARG, PFL_ERR_CORRUPT. O(N). */
+/* Largest distance of a particle from the point (x, y), in the plane of two states: the reach of the cloud; FLT_MAX from
+ * 1.8e19 on, where squares overflow. PFL_OK, PFL_ERR_ARG, PFL_ERR_CORRUPT. O(N). */
 pfl_status_t pfl_farthest(const pfl_t *f, uint16_t x_state, uint16_t y_state, float x, float y, float *distance);
 
 /* What a supervisor wants to know. Counters saturate. */
