@@ -133,7 +133,8 @@ typedef struct {
 
 /* After each resampling, moves the copies apart without changing mean and covariance of the cloud (West 1993; Liu and
  * West 2001): x <- a x + (1 - a) mean + b L n, a^2 + b^2 = 1, L L' the covariance of the resampled particles. For
- * models whose own noise does not separate copies: parameters, biases, no noise at all. Needs PFL_MOMENTS_FULL.
+ * models whose own noise does not separate copies: parameters, biases, no noise at all. Needs PFL_MOMENTS_FULL. A cloud
+ * whose covariance overflows stays as it is.
  * O(N D^2) in a step that resamples. */
 typedef struct {
     float width;          /* b, 0 < b < 1; 0.1 .. 0.5 usual */
