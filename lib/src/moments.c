@@ -320,6 +320,9 @@ bool pfl_moments(pfl_t *f, bool budgeted)
     finish(f, f->mean, f->cov);
     f->moments_current = MOMENTS_CURRENT;
     if (!moments_are_finite(f)) {
+        for (uint32_t d = 0u; d < states; d++) { /* the centre of angles beyond all reason is none */
+            f->centre[d] = pfl_is_finite(f->centre[d]) ? f->centre[d] : 0.0f;
+        }
         memcpy(f->mean, f->centre, sizeof(float) * states);
         memset(f->cov, 0, sizeof(float) * ((states * (states + 1u)) / 2u));
         f->moments_current = MOMENTS_OVERFLOWED;
