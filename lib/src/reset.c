@@ -34,7 +34,8 @@ pfl_status_t pfl_reset(pfl_t *f, uint64_t t_us)
     }
     for (uint32_t d = 0u; d < states; d++) {
         const float jump = f->mean[d] - f->delta[d];
-        f->delta[d] = (((f->config->circular_mask >> d) & 1u) != 0u) ? pfl_wrap_pi_kernel(jump) : jump;
+        const float near = (((f->config->circular_mask >> d) & 1u) != 0u) ? pfl_wrap_pi_kernel(jump) : jump;
+        f->delta[d] = pfl_is_finite(near) ? near : ((near > 0.0f) ? FLT_MAX : -FLT_MAX);
     }
     f->t_us = t_us;
     f->reset_t_us = t_us;

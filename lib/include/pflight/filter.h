@@ -191,7 +191,7 @@ pfl_status_t pfl_init(void *arena, size_t arena_bytes, const pfl_config_t *confi
  * particles are lost, all sit at the last mean), PFL_ERR_BUSY, PFL_ERR_ARG, PFL_ERR_CORRUPT. O(N D^2). */
 pfl_status_t pfl_reset(pfl_t *f, uint64_t t_us);
 
-/* How often the filter was reset, when last, and by how much the mean jumped then (D floats; angles wrapped).
+/* How often the filter was reset, when last, and by how much the mean jumped then (D floats, finite; angles wrapped).
  * Null outputs are skipped; zeros before the first reset. PFL_OK, PFL_ERR_ARG, PFL_ERR_CORRUPT. O(D). */
 pfl_status_t pfl_last_reset(const pfl_t *f, uint32_t *count, uint64_t *t_us, float *delta);
 
