@@ -8,13 +8,14 @@
 #include "rng_kernels.h"
 
 #define SNAPSHOT_MAGIC 0x73706670u /* "pfps" */
-#define SNAPSHOT_VERSION 1u
+#define SNAPSHOT_VERSION 2u
 #define HEAD_WORDS 28u
 #define RNG_WORDS ((4u * PFL_RNG_LANES) + 4u)
 
+/* From `mean` on: mean, best, centre, delta and covariance lie end to end (pfl_lay_out). */
 static size_t moment_words(size_t states)
 {
-    return (3u * states) + ((states * (states + 1u)) / 2u);
+    return (4u * states) + ((states * (states + 1u)) / 2u);
 }
 
 static size_t total_words(const pfl_t *f)
