@@ -192,9 +192,11 @@ bool pfl_invariants_hold(const pfl_t *f)
             hold = hold && pfl_is_finite(x[i]);
         }
     }
+    bool reached = false; /* the top, by a log-weight: else all weights could be zero */
     for (uint32_t i = 0u; i < count; i++) {
         const float relative = f->log_weight[i] - f->log_weight_top;
         hold = hold && (relative <= 0.0f) && pfl_is_not_nan(relative);
+        reached = reached || (relative >= 0.0f);
     }
-    return hold;
+    return hold && reached;
 }

@@ -158,7 +158,8 @@ static bool head_fits(const pfl_t *f, const unsigned char *at)
            (get_word(at + (4 * 27)) < f->config->particles);
 }
 
-/* Streams alive, moments and states finite, log-weights below their top. */
+/* Streams alive, moments and states finite, log-weights not above their top, and one that reaches it: without it all
+ * weights could be zero, and so could their sum. */
 static bool body_is_good(const pfl_t *f, const unsigned char *at)
 {
     const float top = pfl_from_bits((int32_t)get_word(at + (4 * 11)));
@@ -177,12 +178,14 @@ static bool body_is_good(const pfl_t *f, const unsigned char *at)
         good = good && pfl_is_finite(pfl_from_bits((int32_t)get_word(next)));
         next += 4;
     }
+    bool reached = false;
     for (uint32_t i = 0u; i < f->config->particles; i++) {
         const float relative = pfl_from_bits((int32_t)get_word(next)) - top;
         good = good && pfl_is_not_nan(relative) && (relative <= 0.0f);
+        reached = reached || (relative >= 0.0f);
         next += 4;
     }
-    return good;
+    return good && reached;
 }
 
 static uint64_t get_time(const unsigned char *at)

@@ -271,8 +271,8 @@ typedef struct {
 /* Copies the health. PFL_OK, PFL_ERR_ARG, PFL_ERR_CORRUPT. O(1). */
 pfl_status_t pfl_health(const pfl_t *f, pfl_health_t *out);
 
-/* Checks what must always hold: sane control block, finite particles, no NaN or positive weight, random generator
- * not in its dead state. O(N D). */
+/* Checks what must always hold: sane control block, finite particles, no NaN or positive weight, one of the largest
+ * weight, random generator not in its dead state. O(N D). */
 bool pfl_invariants_hold(const pfl_t *f);
 
 /* ---- Looking ahead, keeping, bringing back ------------------------------------------------------------------- */
