@@ -104,10 +104,11 @@ static bool read_rows(recording_t *recording, reader_t *r, FILE *file, const cha
                 return false;
             }
         }
-        if (timed && recording->rows > 0u && row[0] < row[0u - recording->columns]) {
+        const double *before = recording->rows > 0u ? row - recording->columns : row;
+        if (timed && row[0] < before[0]) {
             return fail(failure, EXIT_HARNESS,
                         "%s, line %zu: column %zu (t_s) goes back in time: expected %.17g or more", r->path,
-                        r->line_number, where[0] + 1u, row[0u - recording->columns]);
+                        r->line_number, where[0] + 1u, before[0]);
         }
         recording->rows++;
     }
