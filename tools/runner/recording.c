@@ -9,6 +9,7 @@
 
 #define LINE_MAX_BYTES 4096
 #define FIELDS_MAX 64
+#define NUMBER_MAX 1e12 /* more no measurement is, and a float or a count of microseconds could not hold it */
 
 typedef struct {
     const char *path;
@@ -66,9 +67,9 @@ static bool read_number(const reader_t *r, size_t where, const char *name, doubl
     char *end = r->field[where];
     errno = 0;
     *number = strtod(r->field[where], &end);
-    if (end == r->field[where] || *end != '\0' || !isfinite(*number)) {
-        return fail(failure, EXIT_HARNESS, "%s, line %zu: column %zu (%s) is '%s': expected a number", r->path,
-                    r->line_number, where + 1u, name, r->field[where]);
+    if (end == r->field[where] || *end != '\0' || !(fabs(*number) <= NUMBER_MAX)) {
+        return fail(failure, EXIT_HARNESS, "%s, line %zu: column %zu (%s) is '%s': expected a number of at most %g",
+                    r->path, r->line_number, where + 1u, name, r->field[where], NUMBER_MAX);
     }
     return true;
 }
