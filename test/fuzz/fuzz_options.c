@@ -193,7 +193,9 @@ static void check_study(const cli_t *cli, stream_t *in)
             REQUIRE((uav.filter_seconds <= uav.seconds) && (uav.horizons <= 4u));
         }
     }
-    write_json(&study, id, in);
+    if ((take_u8(in) & 7u) == 0u) { /* takes ten times as long as all else */
+        write_json(&study, id, in);
+    }
 }
 
 int LLVMFuzzerTestOneInput(const uint8_t *data, size_t size)
