@@ -487,6 +487,25 @@ static pfl_status_t do_port(slot_t *s)
     return pfl_health(s->f, &(pfl_health_t){0});
 }
 
+/* What is no filter is told from one. */
+static pfl_status_t do_stranger(slot_t *s)
+{
+    static uint64_t nothing[PFL_CONTROL_BYTES / 8u];
+    float value[STATES * STATES];
+    const bool null = (take_u8(&world.in) & 1u) != 0u;
+    pfl_t *f = null ? NULL : (pfl_t *)(void *)nothing;
+    const pfl_status_t want = null ? PFL_ERR_ARG : PFL_ERR_CORRUPT;
+    REQUIRE((pfl_predict(f, 0u, NULL) == want) && (pfl_update(f, 0u, 0u, value) == want));
+    REQUIRE((pfl_resample(f) == want) && (pfl_reset(f, 0u) == want) && (pfl_estimate(f, value, NULL) == want));
+    REQUIRE((pfl_most_likely(f, value) == want) && (pfl_quantile(f, 0u, 0.5f, value) == want));
+    REQUIRE((pfl_particles(f, &(pfl_view_t){0}, NULL) == want) && (pfl_farthest(f, 0u, 0u, 0.0f, 0.0f, value) == want));
+    REQUIRE((pfl_health(f, &(pfl_health_t){0}) == want) && (pfl_last_reset(f, NULL, NULL, value) == want));
+    REQUIRE((pfl_snapshot(f, value, sizeof value) == want) && (pfl_restore(f, value, sizeof value) == want));
+    REQUIRE((pfl_snapshot_bytes(f) == 0u) && !pfl_invariants_hold(f) && !(pfl_effective_sample_size(f) > 0.0f));
+    REQUIRE((pfl_fork(f, s->arena, s->bytes, &f) == want) && (f == NULL));
+    return pfl_health(s->f, &(pfl_health_t){0});
+}
+
 #define ST(status) (1u << ((status)-PFL_ERR_NO_DRAW))
 
 typedef struct {
@@ -519,6 +538,7 @@ static const call_t calls[] = {
     {"snapshot", do_snapshot, ST(PFL_OK) | ST(PFL_ERR_MEMORY), true},
     {"restore", do_restore, ST(PFL_OK) | ST(PFL_ERR_CORRUPT) | ST(PFL_ERR_ARG), true},
     {"port", do_port, ST(PFL_OK), true},
+    {"stranger", do_stranger, ST(PFL_OK), false},
 };
 enum { CALLS = sizeof calls / sizeof calls[0] };
 
