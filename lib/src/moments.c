@@ -322,6 +322,7 @@ bool pfl_moments(pfl_t *f, bool budgeted)
     const uint32_t states = f->config->states;
     f->moments_current = MOMENTS_STALE;
     if (!sum_up(f, budgeted)) {
+        mend_centre(f);
         return false;
     }
     finish_weights(f);
