@@ -3,7 +3,7 @@
 
 #include "sqrt_kernel.h"
 
-/* Edges are met from within by this share of the radius: eight roundings, more than the way there makes. */
+/* Edges are met from within by this share of the farthest coordinates there: eight roundings, more than the way makes. */
 #define MARGIN 4.76837158e-7f
 
 #define NO_RADIUS 1.0e-12f /* nearer to the center than this there is no direction: any will do */
@@ -13,11 +13,17 @@ static inline bool is_outside(const pfl_ring_t *ring, float square)
     return (square < (ring->inner_m * ring->inner_m)) | (square > (ring->outer_m * ring->outer_m));
 }
 
-/* Where a radius outside lands. */
+static inline float size_of(float x)
+{
+    return (x < 0.0f) ? -x : x;
+}
+
+/* Where a radius outside lands. A ring far from the origin has coarser coordinates than its radius tells. */
 static inline float landing(const pfl_ring_t *ring, float radius)
 {
-    const float out = ring->outer_m - (ring->outer_m * MARGIN);
-    const float in = ring->inner_m + (ring->inner_m * MARGIN);
+    const float far = size_of(ring->center_x_m) + size_of(ring->center_y_m);
+    const float out = ring->outer_m - ((ring->outer_m + far) * MARGIN);
+    const float in = ring->inner_m + ((ring->inner_m + far) * MARGIN);
     return (radius < ring->inner_m) ? in : out;
 }
 

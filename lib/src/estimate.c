@@ -93,7 +93,7 @@ pfl_status_t pfl_farthest(const pfl_t *f, uint16_t x_state, uint16_t y_state, fl
         const float square = (dx * dx) + (dy * dy);
         farthest = (square > farthest) ? square : farthest;
     }
-    *distance = pfl_sqrt_kernel(farthest);
+    *distance = pfl_is_finite(farthest) ? pfl_sqrt_kernel(farthest) : FLT_MAX;
     return PFL_OK;
 }
 
@@ -172,9 +172,11 @@ bool pfl_invariants_hold(const pfl_t *f)
             hold = hold && pfl_is_finite(x[i]);
         }
     }
+    bool reached = f->weights_equal != 0u; /* the top, by a log-weight: else all weights could be zero */
     for (uint32_t i = 0u; (f->weights_equal == 0u) && (i < count); i++) {
         const float relative = f->log_weight[i] - f->log_weight_top;
         hold = hold && (relative <= 0.0f) && pfl_is_not_nan(relative);
+        reached = reached || (relative >= 0.0f);
     }
-    return hold;
+    return hold && reached;
 }

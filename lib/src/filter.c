@@ -89,6 +89,13 @@ static pfl_status_t misfit(pfl_t *f, pfl_status_t status)
     return status;
 }
 
+/* Found before anything is begun: a refusal leaves the cycle's count alone too. */
+static bool is_gap(const pfl_t *f, uint64_t dt_us)
+{
+    const uint64_t longest = f->config->dt_max_us;
+    return (dt_us > UINT32_MAX) || ((longest != 0u) && (dt_us > (longest * PFL_SUBSTEPS_MAX)));
+}
+
 static pfl_status_t predict(pfl_t *f, uint64_t t_us, const void *u)
 {
     if (t_us == f->t_us) {
@@ -97,7 +104,7 @@ static pfl_status_t predict(pfl_t *f, uint64_t t_us, const void *u)
     if (t_us < f->t_us) {
         return misfit(f, PFL_ERR_TIME);
     }
-    if ((t_us - f->t_us) > UINT32_MAX) {
+    if (is_gap(f, t_us - f->t_us)) {
         return misfit(f, PFL_ERR_GAP);
     }
     f->watched.fault &= PFL_FAULT_PORT;

@@ -5,6 +5,7 @@
  * agree are right, so that one flipped bit anywhere is mended without a trace in the results. */
 #include "guard.h"
 
+#include "lanes.h"
 #include "rng_kernels.h"
 
 #define OPEN 0x6F70656Eu     /* "open": a call is in progress, and the block may differ from its copy */
@@ -12,6 +13,7 @@
 
 #define SEALED_WORDS (offsetof(struct pfl, seal) / 4u)
 #define CONSTANT_WORDS (offsetof(struct pfl, reset_t_us) / 4u)
+#define LOOP_WORDS (offsetof(struct pfl, mean) / sizeof(uintptr_t))
 
 typedef char pfl_sealed_part_fits[(sizeof(uint32_t[SEALED_WORDS]) <= sizeof(((struct pfl *)0)->copy)) ? 1 : -1];
 
@@ -102,21 +104,78 @@ static void mend_block(pfl_t *f)
     pfl_count(&f->mended, 1u);
 }
 
-void pfl_guard_after_callback(pfl_t *f)
+/* During a call the seal is that of the copy. */
+static void mend_constants(pfl_t *f)
 {
-    if (PFL_GUARD_CONTROL == 0) {
-        return;
-    }
-    uint32_t different = 0u;
-    for (size_t k = 0u; k < CONSTANT_WORDS; k++) {
-        different |= word_at(f, k) ^ word_at(f->copy, k);
-    }
-    if ((different != 0u) && (hash_words(1u, f->copy, SEALED_WORDS) == f->seal)) {
+    if (hash_words(1u, f->copy, SEALED_WORDS) == f->seal) {
         PFL_COPY(f, f->copy, 4u * CONSTANT_WORDS);
         f->watched.fault |= PFL_FAULT_CONTROL;
         f->watched.event |= PFL_EVENT_MENDED;
         pfl_count(&f->mended, 1u);
     }
+}
+
+void pfl_guard_after_callback(pfl_t *f)
+{
+    const unsigned char *now = (const unsigned char *)f;
+    const unsigned char *kept = (const unsigned char *)f->copy;
+    uintptr_t different = 0u;
+    for (size_t k = 0u; (PFL_GUARD_CONTROL != 0) && (k < LOOP_WORDS); k++) {
+        uintptr_t a;
+        uintptr_t b;
+        PFL_COPY(&a, &now[k * sizeof a], sizeof a);
+        PFL_COPY(&b, &kept[k * sizeof b], sizeof b);
+        different |= a ^ b;
+    }
+    if (different != 0u) {
+        mend_constants(f);
+    }
+}
+
+void pfl_guard_after_batches(pfl_t *f)
+{
+    uint32_t different = 0u;
+    for (size_t k = 0u; (PFL_GUARD_CONTROL != 0) && (k < CONSTANT_WORDS); k++) {
+        different |= word_at(f, k) ^ word_at(f->copy, k);
+    }
+    if (different != 0u) {
+        mend_constants(f);
+    }
+}
+
+/* ---- Callbacks ------------------------------------------------------------------------------------------------ */
+
+pfl_view_t pfl_guard_view(pfl_t *f, uint32_t first, uint32_t n)
+{
+    pfl_view_t view = {&f->x[first], f->stride, first, n};
+    if (PFL_GUARD_CALLBACKS != 0) {
+        const uint32_t states = f->config->states;
+        for (uint32_t d = 0u; d < states; d++) {
+            pfl_lanes_copy(&f->work[(size_t)d * PFL_BATCH], &view.x[d * view.stride], (uint32_t)PFL_CEIL8(n));
+        }
+        view.x = f->work;
+        view.stride = PFL_BATCH;
+    }
+    return view;
+}
+
+float *pfl_guard_bay(pfl_t *f, uint32_t n)
+{
+    float *bay = &f->work[PFL_WORK_FLOATS(f->config->states, f->config->noises) - PFL_BATCH];
+    if (PFL_GUARD_CALLBACKS != 0) {
+        for (uint32_t i = 0u; i < n; i++) {
+            pfl_store_u32(&bay[i], 0x7FC00000u);
+        }
+        if (n < PFL_BATCH) {
+            pfl_store_u32(&bay[n], SENTINEL);
+        }
+    }
+    return bay;
+}
+
+bool pfl_guard_bay_is_whole(const float *bay, uint32_t n)
+{
+    return (PFL_GUARD_CALLBACKS == 0) || (n == PFL_BATCH) || (pfl_load_u32(&bay[n]) == SENTINEL);
 }
 
 /* ---- Canaries ------------------------------------------------------------------------------------------------- */

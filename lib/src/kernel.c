@@ -41,6 +41,21 @@ PFL_NOINLINE static void root_in_place(const pfl_t *f, float *u)
     }
 }
 
+/* A cloud so wide that its moments overflow has no root to move along. A product with zero is NaN for what is not
+ * finite. */
+static bool root_is_finite(const pfl_t *f)
+{
+    const uint32_t states = f->config->states;
+    float sum = 0.0f;
+    for (uint32_t d = 0u; d < states; d++) {
+        sum += f->kernel_mean[d] * 0.0f;
+    }
+    for (uint32_t k = 0u; k < ((states * (states + 1u)) / 2u); k++) {
+        sum += f->kernel_cov[k] * 0.0f;
+    }
+    return pfl_is_finite(sum);
+}
+
 PFL_NOINLINE static void move_state(pfl_t *f, uint32_t d, uint32_t first, uint32_t n)
 {
     const uint32_t states = f->config->states;
@@ -67,6 +82,9 @@ void pfl_kernel_move(pfl_t *f)
     const uint32_t count = f->config->particles;
     pfl_cloud_moments(f, f->kernel_mean, f->kernel_cov);
     root_in_place(f, f->kernel_cov);
+    if (!root_is_finite(f)) {
+        return;
+    }
     for (uint32_t first = 0u; first < count; first += PFL_BATCH) {
         const uint32_t n = ((count - first) < PFL_BATCH) ? (count - first) : PFL_BATCH;
         pfl_make_noise(f, f->config->states, n);

@@ -131,4 +131,20 @@ static inline void pfl_lanes_weigh(float *restrict rows, float *restrict w, cons
     }
 }
 
+/* to = from. A copy of known length is a few moves of several registers on a small core, and no call. */
+static inline void pfl_lanes_copy(float *restrict to, const float *restrict from, uint32_t n)
+{
+    for (uint32_t groups = n / PFL_LANES; groups > 0u; groups--) {
+#if PFL_VECTOR_LANES > 1
+        for (uint32_t k = 0u; k < PFL_LANE_PARTS; k++) {
+            ((pfl_part_t *)to)[k] = ((const pfl_part_t *)from)[k];
+        }
+#else
+        PFL_COPY(to, from, PFL_LANES * sizeof(float));
+#endif
+        to += PFL_LANES;
+        from += PFL_LANES;
+    }
+}
+
 #endif

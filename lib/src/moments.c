@@ -297,17 +297,27 @@ static bool moments_are_finite(const pfl_t *f)
     return pfl_is_finite(sum);
 }
 
+/* Angles beyond all reason have no centre. Nothing that is not finite stays in the arena. */
+static void mend_centre(const pfl_t *f)
+{
+    for (uint32_t d = 0u; d < f->config->states; d++) {
+        f->centre[d] = pfl_is_finite(f->centre[d]) ? f->centre[d] : 0.0f;
+    }
+}
+
 bool pfl_moments(pfl_t *f, bool budgeted)
 {
     const uint32_t states = f->config->states;
     f->moments_current = MOMENTS_STALE;
     if (!sum_up(f, budgeted)) {
+        mend_centre(f);
         return false;
     }
     finish_weights(f);
     finish(f, f->mean, f->cov);
     f->moments_current = MOMENTS_CURRENT;
     if (!moments_are_finite(f)) {
+        mend_centre(f);
         memcpy(f->mean, f->centre, sizeof(float) * states);
         memset(f->cov, 0, sizeof(float) * ((states * (states + 1u)) / 2u));
         f->moments_current = MOMENTS_OVERFLOWED;
@@ -319,6 +329,7 @@ void pfl_cloud_moments(pfl_t *f, float *mean, float *cov)
 {
     (void)sum_up(f, false);
     finish(f, mean, cov);
+    mend_centre(f);
 }
 
 void pfl_refresh(pfl_t *f)

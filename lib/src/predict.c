@@ -180,13 +180,11 @@ PFL_NOINLINE static pfl_status_t catch_up(pfl_t *f, const void *u, float dt_s)
     return PFL_OK;
 }
 
+/* At most PFL_SUBSTEPS_MAX pieces: pfl_predict has refused a longer step. */
 pfl_status_t pfl_propagate(pfl_t *f, uint32_t dt_us, const void *u)
 {
     const uint32_t longest = (f->config->dt_max_us != 0u) ? f->config->dt_max_us : UINT32_MAX;
     const uint32_t pieces = (dt_us / longest) + (((dt_us % longest) != 0u) ? 1u : 0u);
-    if (pieces > PFL_SUBSTEPS_MAX) {
-        return PFL_ERR_GAP;
-    }
     const bool pending = f->resample_pending != 0u;
     uint32_t lost = 0u;
     uint32_t left_us = dt_us;

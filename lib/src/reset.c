@@ -21,7 +21,8 @@ static void account(pfl_t *f, uint32_t event)
 {
     for (uint32_t d = 0u; d < f->config->states; d++) {
         const float jump = f->mean[d] - f->delta[d];
-        f->delta[d] = (((f->config->circular_mask >> d) & 1u) != 0u) ? pfl_wrap_pi_kernel(jump) : jump;
+        const float near = (((f->config->circular_mask >> d) & 1u) != 0u) ? pfl_wrap_pi_kernel(jump) : jump;
+        f->delta[d] = pfl_is_finite(near) ? near : ((near > 0.0f) ? FLT_MAX : -FLT_MAX);
     }
     f->reset_t_us = f->t_us;
     f->resample_pending = 0u;

@@ -13,9 +13,10 @@
 #define TRACK_WORDS 6u
 #define RNG_WORDS ((4u * PFL_RNG_LANES) + 4u)
 
+/* From `mean` on: mean, best, centre, delta and covariance lie end to end (pfl_lay_out). */
 static size_t moment_words(size_t states)
 {
-    return (3u * states) + ((states * (states + 1u)) / 2u);
+    return (4u * states) + ((states * (states + 1u)) / 2u);
 }
 
 static size_t tracked(const pfl_t *f)
@@ -214,7 +215,8 @@ static bool head_fits(const pfl_t *f, const unsigned char *at)
            (get_word(at + (4 * 27)) < f->config->particles) && watch_fits(f, at);
 }
 
-/* Streams alive, moments and states finite, log-weights below their top. */
+/* Streams alive, moments and states finite, log-weights not above their top, and one that reaches it: without it all
+ * weights could be zero, and so could their sum. */
 static bool body_is_good(const pfl_t *f, const unsigned char *at)
 {
     const float top = pfl_from_bits((int32_t)get_word(at + (4 * 11)));
@@ -236,12 +238,14 @@ static bool body_is_good(const pfl_t *f, const unsigned char *at)
         good = good && pfl_is_finite(pfl_from_bits((int32_t)get_word(next)));
         next += 4;
     }
+    bool reached = false;
     for (uint32_t i = 0u; i < f->config->particles; i++) {
         const float relative = pfl_from_bits((int32_t)get_word(next)) - top;
         good = good && pfl_is_not_nan(relative) && (relative <= 0.0f);
+        reached = reached || (relative >= 0.0f);
         next += 4;
     }
-    return good;
+    return good && reached;
 }
 
 static uint64_t get_time(const unsigned char *at)

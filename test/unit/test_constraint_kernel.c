@@ -292,6 +292,26 @@ void test_estimate_stays_that_before_resampling_with_a_kernel_too(void)
     TEST_ASSERT_EQUAL_MEMORY(cov_before, cov_after, sizeof cov_before);
 }
 
+/* A cloud whose covariance overflows, as a line and on the circle, is resampled and otherwise left alone. */
+void test_kernel_leaves_a_cloud_alone_that_is_too_wide(void)
+{
+    const float x[] = {3.0e38f, -3.0e38f, 1.0e20f, -2.0e20f};
+    const ut_table_t table = {x, 4u, 1u};
+    const pfl_kernel_t kernel = {.width = 0.3f, .move = pfl_kernel_move};
+
+    for (uint32_t circular = 0u; circular < 2u; circular++) {
+        pfl_config_t config = ut_dictated_config(4u, 1u);
+        config.draw = ut_table_draw;
+        config.user = (void *)(uintptr_t)&table;
+        config.kernel = &kernel;
+        config.circular_mask = circular;
+        pfl_t *f = ut_filter(&config);
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_resample(f));
+        TEST_ASSERT_TRUE(pfl_invariants_hold(f));
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_restore(f, ut_snapshot(f), pfl_snapshot_bytes(f)));
+    }
+}
+
 /* ---- Reach ---------------------------------------------------------------------------------------------------- */
 
 void test_farthest_is_the_largest_distance(void)
@@ -308,6 +328,8 @@ void test_farthest_is_the_largest_distance(void)
     TEST_ASSERT_FLOAT_WITHIN(1e-5f, 10.0f, distance);
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_farthest(f, 1u, 0u, 8.0f, -6.0f, &distance));
     TEST_ASSERT_FLOAT_WITHIN(1e-5f, 10.0f, distance);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_farthest(f, 0u, 1u, -3.0e38f, 3.0e38f, &distance));
+    TEST_ASSERT_TRUE(ut_finite(distance) && (distance > 1.0e38f));
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_farthest(f, 2u, 0u, 0.0f, 0.0f, &distance));
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_farthest(f, 0u, 1u, ut_nan(false), 0.0f, &distance));
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_farthest(f, 0u, 1u, 0.0f, 0.0f, NULL));

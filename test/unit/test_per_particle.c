@@ -76,7 +76,7 @@ static void fly(void *arena, size_t bytes, pfl_predict_fn predict, pfl_loglik_fn
 {
     float sigma = 0.5f;
     const float thrust = 9.0f;
-    const pfl_sensor_t sensor = {loglik, NULL, 0.0f};
+    const pfl_sensor_t sensor = {.loglik = loglik};
     pfl_config_t config;
     pfl_view_t view;
     pfl_t *f = NULL;

@@ -269,6 +269,8 @@ void test_a_snapshot_in_mid_cycle_continues_with_the_same_bits(void)
 void test_restored_filter_answers_as_the_kept_one(void)
 {
     float best[2][2];
+    float mean[2][2];
+    float cov[2][4];
     uint32_t count[2];
     const pfl_config_t c = ut_linear_config(N);
     pfl_t *f = flown(&c, 4u);
@@ -276,6 +278,10 @@ void test_restored_filter_answers_as_the_kept_one(void)
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_reset(f, 77u));
     (void)ut_fly_linear(f, 100077u, 1.0f, 0u);
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_restore(twin, ut_snapshot(f), pfl_snapshot_bytes(f)));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_estimate(f, mean[0], cov[0]));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_estimate(twin, mean[1], cov[1]));
+    TEST_ASSERT_EQUAL_MEMORY(mean[0], mean[1], sizeof mean[0]);
+    TEST_ASSERT_EQUAL_MEMORY(cov[0], cov[1], sizeof cov[0]);
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_most_likely(f, best[0]));
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_most_likely(twin, best[1]));
     TEST_ASSERT_EQUAL_MEMORY(best[0], best[1], sizeof best[0]);

@@ -81,7 +81,7 @@ void test_bounce_reverses_and_clamp_leaves_the_speed(void)
     expect(0u, 100.0, 0.0, 3.0, 4.0, 1e-4);
 }
 
-/* Whatever was projected counts as inside, on any ring around the origin. */
+/* Whatever was projected counts as inside, on any ring, around the origin or far from it. */
 void test_what_was_projected_is_inside(void)
 {
     static const pfl_project_fn way[] = {pfl_ring_slide, pfl_ring_bounce, pfl_ring_clamp};
@@ -90,12 +90,14 @@ void test_what_was_projected_is_inside(void)
 
     for (uint32_t draw = 0u; draw < DRAWS; draw += PFL_BATCH) {
         const float inner = (float)(1000.0 * ut_uniform(&dice));
-        pfl_ring_t any = {0u, 1u, 2u, 3u, 0.0f, 0.0f, inner, inner + 0.1f + (float)(10.0 * ut_uniform(&dice))};
+        const float far = ((draw & PFL_BATCH) != 0u) ? (float)(5000.0 * ut_gaussian(&dice)) : 0.0f;
+        pfl_ring_t any = {0u, 1u, 2u, 3u, far, -far, inner, inner + 0.1f + (float)(10.0 * ut_uniform(&dice))};
         for (uint32_t i = 0u; i < PFL_BATCH; i++) {
-            set(i, (float)(2.0 * (double)inner * ut_gaussian(&dice)), (float)(2.0 * (double)inner * ut_gaussian(&dice)),
-                (float)ut_gaussian(&dice), (float)ut_gaussian(&dice));
+            set(i, far + (float)(2.0 * (double)inner * ut_gaussian(&dice)),
+                -far + (float)(2.0 * (double)inner * ut_gaussian(&dice)), (float)ut_gaussian(&dice),
+                (float)ut_gaussian(&dice));
         }
-        set(0u, 0.0f, 0.0f, 1.0f, 1.0f); /* no direction: any will do */
+        set(0u, far, -far, 1.0f, 1.0f); /* no direction: any will do */
         way[draw % 3u](&any, &p);
         pfl_ring_inside(&any, &view, inside);
         for (uint32_t i = 0u; i < PFL_BATCH; i++) {

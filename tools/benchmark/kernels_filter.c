@@ -6,7 +6,7 @@ static const pfl_position_t broad = {2u, {0u, 1u, 0u, 0u}, {1.0f, 1.0f, 0.0f, 0.
 static const pfl_position_t sharp = {2u, {0u, 1u, 0u, 0u}, {100.0f, 100.0f, 0.0f, 0.0f}};
 static const pfl_position_t blind = {2u, {0u, 1u, 0u, 0u}, {0.0f, 0.0f, 0.0f, 0.0f}};
 static const float seen[2] = {0.1f, -0.2f};
-static pfl_sensor_t sensor = {pfl_position_loglik, NULL, 0.0f};
+static pfl_sensor_t sensor = {.loglik = pfl_position_loglik};
 static pfl_config_t config;
 PFL_ARENA(arena, KERNEL_N, 4u, 2u);
 

@@ -9,6 +9,7 @@
 
 #define LINE_MAX_BYTES 4096
 #define FIELDS_MAX 64
+#define NUMBER_MAX 1e12 /* more no measurement is, and a float or a count of microseconds could not hold it */
 
 typedef struct {
     const char *path;
@@ -66,9 +67,9 @@ static bool read_number(const reader_t *r, size_t where, const char *name, doubl
     char *end = r->field[where];
     errno = 0;
     *number = strtod(r->field[where], &end);
-    if (end == r->field[where] || *end != '\0' || !isfinite(*number)) {
-        return fail(failure, EXIT_HARNESS, "%s, line %zu: column %zu (%s) is '%s': expected a number", r->path,
-                    r->line_number, where + 1u, name, r->field[where]);
+    if (end == r->field[where] || *end != '\0' || !(fabs(*number) <= NUMBER_MAX)) {
+        return fail(failure, EXIT_HARNESS, "%s, line %zu: column %zu (%s) is '%s': expected a number of at most %g",
+                    r->path, r->line_number, where + 1u, name, r->field[where], NUMBER_MAX);
     }
     return true;
 }
@@ -104,10 +105,11 @@ static bool read_rows(recording_t *recording, reader_t *r, FILE *file, const cha
                 return false;
             }
         }
-        if (timed && recording->rows > 0u && row[0] < row[0u - recording->columns]) {
+        const double *before = recording->rows > 0u ? row - recording->columns : row;
+        if (timed && row[0] < before[0]) {
             return fail(failure, EXIT_HARNESS,
                         "%s, line %zu: column %zu (t_s) goes back in time: expected %.17g or more", r->path,
-                        r->line_number, where[0] + 1u, row[0u - recording->columns]);
+                        r->line_number, where[0] + 1u, before[0]);
         }
         recording->rows++;
     }

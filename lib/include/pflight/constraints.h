@@ -20,9 +20,9 @@ typedef struct {
 
 void pfl_ring_inside(void *user, const pfl_view_t *p, uint32_t *inside);
 
-/* All three move a particle that is outside straight to the nearer edge: within it by some 5e-7 of the radius, so that
- * it counts as inside whatever the rounding. They differ in the speed that points further out, v.n:
- * slide takes it off, bounce reverses it, clamp leaves it, so that the particle leaves again with the next step. */
+/* All three move a particle that is outside straight to the nearer edge: within it by some 5e-7 of the radius and of
+ * the center's coordinates, so that it counts as inside whatever the rounding. They differ in the speed that points
+ * further out, v.n: slide takes it off, bounce reverses it, clamp leaves it, so that the particle leaves again with the next step. */
 void pfl_ring_slide(void *user, const pfl_batch_t *p);
 void pfl_ring_bounce(void *user, const pfl_batch_t *p);
 void pfl_ring_clamp(void *user, const pfl_batch_t *p);

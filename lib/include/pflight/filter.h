@@ -153,7 +153,8 @@ void pfl_constraint_keep(pfl_t *f, const void *u, float dt_s, uint32_t first, ui
 
 /* After each resampling, moves the copies apart without changing mean and covariance of the cloud (West 1993; Liu and
  * West 2001): x <- a x + (1 - a) mean + b L n, a^2 + b^2 = 1, L L' the covariance of the resampled particles. For
- * models whose own noise does not separate copies: parameters, biases, no noise at all. Needs PFL_MOMENTS_FULL.
+ * models whose own noise does not separate copies: parameters, biases, no noise at all. Needs PFL_MOMENTS_FULL. A cloud
+ * whose covariance overflows stays as it is.
  * O(N D^2) in a step that resamples. */
 typedef struct {
     float width;            /* b, 0 < b < 1; 0.1 .. 0.5 usual */
@@ -232,7 +233,7 @@ pfl_status_t pfl_init(void *arena, size_t arena_bytes, const pfl_config_t *confi
  * particles are lost, all sit at the last mean), PFL_ERR_BUSY, PFL_ERR_ARG, PFL_ERR_CORRUPT. O(N D^2). */
 pfl_status_t pfl_reset(pfl_t *f, uint64_t t_us);
 
-/* How often the filter was reset, when last, and by how much the mean jumped then (D floats; angles wrapped).
+/* How often the filter was reset, when last, and by how much the mean jumped then (D floats, finite; angles wrapped).
  * Null outputs are skipped; zeros before the first reset. PFL_OK, PFL_ERR_ARG, PFL_ERR_CORRUPT. O(D). */
 pfl_status_t pfl_last_reset(const pfl_t *f, uint32_t *count, uint64_t *t_us, float *delta);
 
@@ -284,8 +285,8 @@ float pfl_effective_sample_size(const pfl_t *f);
  * PFL_ERR_CORRUPT. O(1), O(N) with weights. */
 pfl_status_t pfl_particles(const pfl_t *f, pfl_view_t *view, float *log_weights);
 
-/* Largest distance of a particle from the point (x, y), in the plane of two states: the reach of the cloud. PFL_OK,
- * PFL_ERR_ARG, PFL_ERR_CORRUPT. O(N). */
+/* Largest distance of a particle from the point (x, y), in the plane of two states: the reach of the cloud; FLT_MAX from
+ * 1.8e19 on, where squares overflow. PFL_OK, PFL_ERR_ARG, PFL_ERR_CORRUPT. O(N). */
 pfl_status_t pfl_farthest(const pfl_t *f, uint16_t x_state, uint16_t y_state, float x, float y, float *distance);
 
 /* Phase, masks, counters: health.h tells what each means. PFL_OK, PFL_ERR_ARG, PFL_ERR_CORRUPT. O(sensors). */
@@ -304,8 +305,8 @@ pfl_status_t pfl_record(const pfl_t *f, pfl_record_t *out);
  * configuration changed: it is the caller's to mend), PFL_ERR_BUSY, PFL_ERR_ARG, PFL_ERR_CORRUPT. O(N D). */
 pfl_status_t pfl_scrub(pfl_t *f, uint32_t *mended);
 
-/* Checks what must always hold: sane control block, finite particles, no NaN or positive weight, random generator
- * not in its dead state. O(N D). */
+/* Checks what must always hold: sane control block, finite particles, no NaN or positive weight, one of the largest
+ * weight, random generator not in its dead state. O(N D). */
 bool pfl_invariants_hold(const pfl_t *f);
 
 /* ---- Looking ahead, keeping, bringing back ------------------------------------------------------------------- */

@@ -5,7 +5,7 @@
 
 static pfl_land_vehicle_t vehicle;
 static pfl_position_t seen;
-static pfl_sensor_t sensor = {pfl_position_loglik, &seen, 0.0f};
+static pfl_sensor_t sensor = {.loglik = pfl_position_loglik, .user = &seen};
 static pfl_config_t config;
 static float start[4];
 static pfl_t *filter;

@@ -62,6 +62,7 @@ static const pfl_route_t *next_route(void)
     const uint32_t count = words_next();
     route.waypoint = waypoints;
     route.count = (count < TAPE_WAYPOINTS_MAX) ? count : TAPE_WAYPOINTS_MAX;
+    route.count = (route.count > 0u) ? route.count : 1u; /* the library takes no route without a waypoint */
     route.closed = words_next() != 0u;
     route.switching = (pfl_switching_t)words_next();
     route.reach_m = words_next_float();
