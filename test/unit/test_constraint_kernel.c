@@ -297,7 +297,7 @@ void test_kernel_leaves_a_cloud_alone_that_is_too_wide(void)
 {
     const float x[] = {3.0e38f, -3.0e38f, 1.0e20f, -2.0e20f};
     const ut_table_t table = {x, 4u, 1u};
-    const pfl_kernel_t kernel = {.width = 0.3f, .move = pfl_kernel_move};
+    const pfl_kernel_t kernel = {.width = 0.5f, .move = pfl_kernel_move};
 
     for (uint32_t circular = 0u; circular < 2u; circular++) {
         pfl_config_t config = ut_dictated_config(4u, 1u);
