@@ -49,6 +49,7 @@ set(PFLIGHT_LIB_SOURCES
   sensor_coloured.c
   sensor_velocity.c
   guidance_waypoint.c
+  proposal_linear.c
 )
 list(TRANSFORM PFLIGHT_LIB_SOURCES PREPEND "${CMAKE_CURRENT_LIST_DIR}/src/")
 
@@ -60,6 +61,7 @@ set(PFLIGHT_LIB_HEADERS
   math.h
   models.h
   port.h
+  proposal.h
   rng.h
   sensors.h
   status.h

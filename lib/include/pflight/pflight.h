@@ -8,6 +8,7 @@
 #include "pflight/math.h"
 #include "pflight/models.h"
 #include "pflight/port.h"
+#include "pflight/proposal.h"
 #include "pflight/rng.h"
 #include "pflight/sensors.h"
 #include "pflight/status.h"
