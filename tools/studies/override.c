@@ -5,8 +5,11 @@
  * PFLIGHT_STUDY_ESS=R            ess_ratio, of filters whose configuration has one
  * PFLIGHT_STUDY_NOISE=KIND       plain, antithetic, quasi, array (noise.h)
  * PFLIGHT_STUDY_VALUES=FILE      the runs' values go there, one line a run
- * PFLIGHT_STUDY_COUNT=I          calls on the I-th filter that is made, from 1, go through count_*: a profiler collects
- *                                there; at the end their cycles are printed to standard error. One run, one thread. */
+ * PFLIGHT_STUDY_FILTER=I/M       of M filters that a run makes, one after the other, the I-th is looked at, from 1: its calls
+ *                                go through count_*, where a profiler collects; at the end their cycles are printed to
+ *                                standard error. One thread
+ * PFLIGHT_STUDY_CYCLES=K         all ends after K of them: enough to know what one costs
+ * PFLIGHT_STUDY_ESTIMATES=FILE   and its estimates go there: the first two states, two floats a call of pfl_estimate */
 #include "monte_carlo.h"
 #include "noise.h"
 
@@ -29,7 +32,8 @@ typedef struct {
 } override_t;
 
 __extension__ static __thread override_t *latest;
-static unsigned long counted_filter, filters, cycles;
+static unsigned long looked_at, of_filters, filters, cycles, cycles_max;
+static FILE *estimates;
 
 static const char *wish(const char *name, const char *otherwise)
 {
@@ -55,8 +59,9 @@ WRAP(pfl_status_t, pfl_init, (void *arena, size_t arena_bytes, const pfl_config_
     const char *ess = wish("PFLIGHT_STUDY_ESS", NULL);
     const noise_kind_t kind = noise_kind(wish("PFLIGHT_STUDY_NOISE", "plain"));
 
-    counted_filter = strtoul(wish("PFLIGHT_STUDY_COUNT", "0"), NULL, 10);
-    filters += counted_filter > 0u ? 1u : 0u;
+    if (looked_at > 0u) {
+        filters++;
+    }
     if (latest != NULL) {
         noise_free(&latest->noise);
         free(latest);
@@ -120,11 +125,23 @@ __attribute__((noinline)) static pfl_status_t count_estimate(pfl_t *f, float *me
 
 static bool is_counted(void)
 {
-    return counted_filter > 0u && filters == counted_filter;
+    return looked_at > 0u && (filters - 1u) % of_filters == looked_at - 1u;
+}
+
+static void write_estimate(const float *mean)
+{
+    if (estimates != NULL && fwrite(mean, sizeof *mean, 2u, estimates) != 2u) {
+        (void)fprintf(stderr, "study: cannot write the estimates\n");
+        exit(3);
+    }
 }
 
 WRAP(pfl_status_t, pfl_predict, (pfl_t * f, uint64_t t_us, const void *u))
 {
+    if (cycles_max > 0u && cycles == cycles_max) {
+        (void)fprintf(stderr, "cycles %lu\n", cycles);
+        exit(0);
+    }
     return is_counted() ? count_predict(f, t_us, u) : __real_pfl_predict(f, t_us, u);
 }
 
@@ -140,7 +157,12 @@ WRAP(pfl_status_t, pfl_resample, (pfl_t * f))
 
 WRAP(pfl_status_t, pfl_estimate, (pfl_t * f, float *mean, float *cov))
 {
-    return is_counted() ? count_estimate(f, mean, cov) : __real_pfl_estimate(f, mean, cov);
+    if (!is_counted()) {
+        return __real_pfl_estimate(f, mean, cov);
+    }
+    const pfl_status_t status = count_estimate(f, mean, cov);
+    write_estimate(mean);
+    return status;
 }
 
 /* ---- The runs' values ------------------------------------------------------------------------------------------------- */
@@ -164,9 +186,19 @@ WRAP(bool, monte_carlo,
      (const study_t *study, const plan_t *plan, unsigned threads, results_t *results, failure_t *failure))
 {
     const char *path = wish("PFLIGHT_STUDY_VALUES", NULL);
-    const bool done = __real_monte_carlo(study, plan, threads, results, failure);
+    const char *wanted = wish("PFLIGHT_STUDY_FILTER", "");
+    const char *file = wish("PFLIGHT_STUDY_ESTIMATES", NULL);
+    char *rest;
 
-    if (counted_filter > 0u) {
+    looked_at = strtoul(wanted, &rest, 10);
+    of_filters = looked_at > 0u ? strtoul(rest + 1, NULL, 10) : 1u;
+    cycles_max = strtoul(wish("PFLIGHT_STUDY_CYCLES", "0"), NULL, 10);
+    estimates = file != NULL ? fopen(file, "wb") : NULL;
+    const bool done = __real_monte_carlo(study, plan, looked_at > 0u ? 1u : threads, results, failure);
+    if (estimates != NULL) {
+        (void)fclose(estimates);
+    }
+    if (looked_at > 0u) {
         (void)fprintf(stderr, "cycles %lu\n", cycles);
     }
     if (done && path != NULL && !write_values(path, study, plan, results)) {
