@@ -4,6 +4,7 @@
 #include "rng_kernels.h"
 
 #include <math.h>
+#include <string.h>
 
 /* Phi at the knots of a cubic Hermite interpolation; its slope is the density. Error below step^4 / 384. */
 #define KNOTS_PER_UNIT 512
@@ -90,4 +91,30 @@ uint32_t source_word(source_t *source)
         source->next = 0u;
     }
     return source->word[source->next++];
+}
+
+static uint64_t add_word(uint64_t hash, uint32_t word)
+{
+    for (uint32_t shift = 0u; shift < 32u; shift += 8u) {
+        hash = (hash ^ ((word >> shift) & 0xFFu)) * 0x100000001B3u; /* FNV-1a */
+    }
+    return hash;
+}
+
+uint64_t source_fingerprint(source_kind_t kind, uint64_t seed)
+{
+    enum { NUMBERS = 65536 };
+    static float z[NUMBERS];
+    static source_t source;
+    uint64_t hash = 0xCBF29CE484222325u;
+
+    source_start(&source, kind, seed, 0u);
+    pfl_rng_t rng = source.rng;
+    pfl_rng_normals(&rng, z, NUMBERS / (2u * PFL_RNG_LANES));
+    for (uint32_t i = 0u; i < NUMBERS; i++) {
+        uint32_t bits;
+        memcpy(&bits, &z[i], sizeof bits);
+        hash = add_word(hash, kind == SOURCE_NORMAL ? bits : source_word(&source));
+    }
+    return hash;
 }

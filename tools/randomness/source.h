@@ -27,6 +27,9 @@ void source_start(source_t *source, source_kind_t kind, uint64_t seed, unsigned 
  * next eight less and less. Twenty would still be fair to a single test; with sixteen two fill a word. */
 uint32_t source_word(source_t *source);
 
+/* A hash of the bits of the first 65536 numbers: a result that was stored holds as long as this is the same. */
+uint64_t source_fingerprint(source_kind_t kind, uint64_t seed);
+
 /* The distribution function of the normal, to 1e-14, for |z| < 8. */
 double normal_cdf(float z);
 

@@ -48,21 +48,6 @@ void noise_free(noise_t *noise)
     free(noise->column);
 }
 
-/* ---- Antithetic --------------------------------------------------------------------------------------------------- */
-
-static void fill_antithetic(noise_t *noise, uint32_t n, float *out)
-{
-    float half[PFL_BATCH];
-
-    for (uint32_t q = 0u; q < noise->noises; q++) {
-        pfl_rng_normals(&noise->rng, half, (n / 2u + 15u) / 16u);
-        for (uint32_t i = 0u; i < n; i += 2u) {
-            out[q * PFL_BATCH + i] = half[i / 2u];
-            out[q * PFL_BATCH + i + 1u] = -half[i / 2u];
-        }
-    }
-}
-
 /* ---- Quasi-random --------------------------------------------------------------------------------------------------- */
 
 /* The normal's quantile by Wichura's PPND7 (1988), good to 7 digits. */
@@ -156,10 +141,6 @@ static void begin_step(noise_t *noise, const pfl_batch_t *p)
 
 void noise_fill(noise_t *noise, const pfl_batch_t *p, float *out)
 {
-    if (noise->kind == NOISE_ANTITHETIC) {
-        fill_antithetic(noise, p->n, out);
-        return;
-    }
     if (p->first == 0u) {
         begin_step(noise, p);
     }

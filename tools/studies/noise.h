@@ -9,7 +9,7 @@
 
 typedef enum {
     NOISE_PLAIN,      /* the library's */
-    NOISE_ANTITHETIC, /* particles in pairs, the second's noise the first's with all signs changed */
+    NOISE_ANTITHETIC, /* the library's too (pflight/antithetic.h): not made here */
     NOISE_QUASI, /* all N particles share a lattice of Q dimensions, shifted at random and in random order each step */
     NOISE_ARRAY  /* the particles are sorted along a Z-curve through their first two states, and the lattice has one
                          dimension more: the place in that order (array-RQMC; L'Ecuyer, Lecot and Tuffin 2008). Equal

@@ -29,6 +29,7 @@ typedef struct {
     pfl_config_t config;
     pfl_predict_fn predict;
     noise_t noise;
+    uint32_t noises;
 } override_t;
 
 __extension__ static __thread override_t *latest;
@@ -53,11 +54,36 @@ static void predict_with_noise(void *user, const void *u, float dt_s, const pfl_
     latest->predict(user, u, dt_s, &batch);
 }
 
+static void predict_antithetic(void *user, const void *u, float dt_s, const pfl_batch_t *p)
+{
+    pfl_antithetic_t antithetic = {latest->predict, user, latest->noises};
+    pfl_antithetic_predict(&antithetic, u, dt_s, p);
+}
+
+/* What ours cost is all that there is to count: the library makes no noise that nobody wants. */
+static bool take_noise(const pfl_config_t *config)
+{
+    const noise_kind_t kind = noise_kind(wish("PFLIGHT_STUDY_NOISE", "plain"));
+
+    latest->predict = config->predict;
+    latest->noises = config->noises;
+    if (kind == NOISE_PLAIN || config->noises == 0u) {
+        return true;
+    }
+    if (kind == NOISE_ANTITHETIC) {
+        latest->config.noises = (uint16_t)PFL_ANTITHETIC_NOISES(config->noises);
+        latest->config.predict = predict_antithetic;
+        return config->noises <= PFL_ANTITHETIC_MAX;
+    }
+    latest->config.noises = 0u;
+    latest->config.predict = predict_with_noise;
+    return noise_start(&latest->noise, kind, config);
+}
+
 WRAP(pfl_status_t, pfl_init, (void *arena, size_t arena_bytes, const pfl_config_t *config, uint64_t t_us, pfl_t **out))
 {
     const char *scheme = wish("PFLIGHT_STUDY_SCHEME", NULL);
     const char *ess = wish("PFLIGHT_STUDY_ESS", NULL);
-    const noise_kind_t kind = noise_kind(wish("PFLIGHT_STUDY_NOISE", "plain"));
 
     if (looked_at > 0u) {
         filters++;
@@ -71,19 +97,14 @@ WRAP(pfl_status_t, pfl_init, (void *arena, size_t arena_bytes, const pfl_config_
         return PFL_ERR_MEMORY;
     }
     latest->config = *config;
-    latest->predict = config->predict;
     if (scheme != NULL) {
         latest->config.resampling = (uint16_t)strtoul(scheme, NULL, 10);
     }
     if (ess != NULL && config->ess_ratio > 0.0f) {
         latest->config.ess_ratio = strtof(ess, NULL);
     }
-    if (kind != NOISE_PLAIN && config->noises > 0u) {
-        if (!noise_start(&latest->noise, kind, config)) {
-            return PFL_ERR_MEMORY;
-        }
-        latest->config.noises = 0u; /* the library makes none: what ours cost is all that there is to count */
-        latest->config.predict = predict_with_noise;
+    if (!take_noise(config)) {
+        return PFL_ERR_MEMORY;
     }
     return __real_pfl_init(arena, arena_bytes, &latest->config, t_us, out);
 }

@@ -2,6 +2,7 @@
 #ifndef PFLIGHT_PFLIGHT_H
 #define PFLIGHT_PFLIGHT_H
 
+#include "pflight/antithetic.h"
 #include "pflight/constraints.h"
 #include "pflight/filter.h"
 #include "pflight/guidance.h"
