@@ -12,7 +12,7 @@ extern "C" {
 
 /* pfl_config_t.noises that serve a model with q noises. */
 #define PFL_ANTITHETIC_NOISES(q) (((q) + 1u) / 2u)
-#define PFL_ANTITHETIC_MAX 8u /* noises of the model */
+#define PFL_ANTITHETIC_MAX 4u /* noises of the model */
 
 typedef struct {
     pfl_predict_fn predict; /* the model, not null */
@@ -21,7 +21,7 @@ typedef struct {
 } pfl_antithetic_t;
 
 /* user: pfl_antithetic_t; u: the model's. Q = PFL_ANTITHETIC_NOISES(noises). Particles 2i and 2i + 1 of a batch are a
- * pair. O(n noises) on top of the model. Stack: 256 B a noise of PFL_ANTITHETIC_MAX, 2 KB. */
+ * pair. O(n noises) on top of the model. Stack: 256 B a noise of PFL_ANTITHETIC_MAX, 1 KB. */
 void pfl_antithetic_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p);
 
 #ifdef __cplusplus
