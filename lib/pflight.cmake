@@ -53,11 +53,14 @@ set(PFLIGHT_LIB_SOURCES
   sensor_coloured.c
   sensor_velocity.c
   guidance_waypoint.c
+  antithetic.c
+  proposal_linear.c
 )
 list(TRANSFORM PFLIGHT_LIB_SOURCES PREPEND "${CMAKE_CURRENT_LIST_DIR}/src/")
 
 set(PFLIGHT_LIB_HEADERS
   pflight.h
+  antithetic.h
   constraints.h
   filter.h
   guidance.h
@@ -66,6 +69,7 @@ set(PFLIGHT_LIB_HEADERS
   models.h
   per_particle.h
   port.h
+  proposal.h
   rng.h
   sensors.h
   status.h

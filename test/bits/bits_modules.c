@@ -63,6 +63,22 @@ static void of_models(void)
     static pfl_lane_target_t lane = {0.7f, 1.5f, 6.5f, 2.0f, 0.7f, 5.0f};
     static pfl_coast_t coast = {3u, 1u};
     static pfl_turn_t turn = {0.15f, 0.05f, 0.1f, 0.3f, 1u};
+    static pfl_constant_velocity_t still = {0.0f, 0.0f};
+    static pfl_constant_velocity_t moving = {1.5f, 0.3f};
+    static pfl_proposal_t proposal = {pfl_constant_velocity_predict,
+                                      &still,
+                                      4u,
+                                      2u,
+                                      {0u, 1u},
+                                      {0u, 1u},
+                                      {2u, 3u},
+                                      {0.3f, 0.2f},
+                                      {1.1f, 0.0f},
+                                      {0.5f, 0.7f}};
+    static const float seen[2] = {1.5f, -0.5f};
+    static const pfl_proposal_input_t with_seen = {NULL, seen};
+    static const pfl_proposal_input_t without = {NULL, NULL};
+    static pfl_antithetic_t antithetic = {pfl_constant_velocity_predict, &moving, 4u};
     of_model("model-autopilot", pfl_autopilot_predict, &pilot, &wanted, 1.0f, 20.0f);
     pilot.waypoint_state = 0u;
     of_model("model-autopilot-heading", pfl_autopilot_predict, &pilot, &wanted, 1.0f, 3.0f);
@@ -72,6 +88,9 @@ static void of_models(void)
     of_model("model-lane-target", pfl_lane_target_predict, &lane, NULL, 2.0f, 3.0f);
     of_model("model-coast", pfl_coast_predict, &coast, NULL, 0.0f, 9.0f);
     of_model("model-turn", pfl_turn_predict, &turn, NULL, 0.0f, 3.0f);
+    of_model("proposal", pfl_proposal_predict, &proposal, &with_seen, 0.0f, 3.0f);
+    of_model("proposal-free", pfl_proposal_predict, &proposal, &without, 0.0f, 3.0f);
+    of_model("antithetic", pfl_antithetic_predict, &antithetic, NULL, 0.0f, 3.0f);
 }
 
 static void of_sensor(const char *part, pfl_loglik_fn loglik, void *user, const void *z)

@@ -55,7 +55,7 @@ class Json(unittest.TestCase):
         self.assertEqual(
             {"filter": "pf", "particles": 64, "runs": 3, "seed": 18446744073709551615, "case": 2,
              "reading": "variance", "start": "known", "jitter": "off", "theta": 0.25, "resampling": "systematic",
-             "ukf": "tuned"}, result["settings"])
+             "proposal": "prior", "ukf": "tuned"}, result["settings"])
 
     def test_standard_error_of_one_run_is_null(self):
         _, result = run_json(LAND, "--runs", "1")

@@ -14,6 +14,7 @@ static const setting_t settings[] = {
     {"jitter", "off|on", 0.0, 0.0, "off", "pf: 0.05 m/s and 0.02 rad per step"},
     {"theta", NULL, 0.0, 1.0, "0.5", "pf: resample when the effective sample size < theta N"},
     {"resampling", "systematic|stratified|residual|multinomial", 0.0, 0.0, "systematic", "pf: the scheme"},
+    {"proposal", "prior|optimal", 0.0, 0.0, "prior", "pf: optimal: particles move to where the measurement says"},
     {"ukf", "tuned|forgot-t|r-identity|q-zero-p-identity|q-all-small|q-all-large|q-zero-p-zero|raw", 0.0, 0.0, "tuned",
      "ukf: its tuning"},
 };
@@ -40,6 +41,7 @@ static void read_settings(const study_t *study, land_study_t *s)
     s->std_reading = study_is(study, "reading", "std");
     s->uncertain = study_is(study, "start", "uncertain");
     s->jitter = study_is(study, "jitter", "on");
+    s->optimal = study_is(study, "proposal", "optimal");
     s->theta = (float)study_number(study, "theta");
     s->resampling = (pfl_resampling_t)study_choice(study, "resampling");
     s->particles = study->particles;

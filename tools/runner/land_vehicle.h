@@ -38,6 +38,7 @@ typedef struct {
     bool std_reading;    /* the paper's sigmas taken for standard deviations */
     bool uncertain;      /* start drawn instead of known */
     bool jitter;
+    bool optimal; /* the optimal proposal instead of the model's noise */
     float theta;
     pfl_resampling_t resampling;
     uint32_t particles;

@@ -7,7 +7,7 @@
 #include <stdlib.h>
 
 #define KERNEL_WIDTH 0.5f
-#define STATES_MAX (UAV_STATES + 3)
+#define STATES_MAX (UAV_STATES + 4)
 #define NOISES_MAX 4u
 #define CLOUD_EVERY_S 5u /* in a trace: the cloud at these seconds, and at the second before, where a fix is due next */
 
@@ -20,6 +20,8 @@ typedef struct {
     float start_sigma[STATES_MAX];
     const uav_study_t *study;
     const uav_clouds_t *clouds;
+    pfl_autopilot_t quiet; /* without the gusts that the proposal draws */
+    pfl_proposal_t proposal;
     pfl_position_t position;
     pfl_sensor_t sensor;
     pfl_kernel_t kernel;
@@ -57,6 +59,33 @@ static void add_states(const uav_study_t *s, model_t *model)
     }
 }
 
+static void predict_optimal(void *user, const void *u, float dt_s, const pfl_batch_t *p)
+{
+    pfl_proposal_predict(&((model_t *)user)->proposal, u, dt_s, p);
+}
+
+/* A gust is held over the second between two steps, and moves the position only: linear, whatever the pilot does. */
+static void set_proposal(const uav_study_t *s, model_t *model)
+{
+    const float moved = (float)(s->set.sigma_gust_mps * 1e-6 * (double)UAV_PERIOD_US);
+    const float seen = (float)s->set.sigma_fix_m;
+
+    model->quiet = model->vehicle;
+    model->quiet.sigma_gust_mps = 0.0f;
+    model->proposal = (pfl_proposal_t){
+        .predict = pfl_autopilot_predict,
+        .user = &model->quiet,
+        .loglik_state = (uint16_t)model->states,
+        .count = UAV_FIX,
+        .state = {PFL_AUTOPILOT_X, PFL_AUTOPILOT_Y, PFL_AUTOPILOT_HEIGHT, 0u},
+        .noise = {0u, 1u, 0u, 0u},
+        .sigma_noise = {moved, moved, 0.0f, 0.0f},
+        .sigma_measured = {seen, seen, seen, 0.0f},
+    };
+    model->states += 1u;
+    model->sensor = (pfl_sensor_t){.loglik = pfl_proposal_loglik, .user = &model->proposal};
+}
+
 static void make_model(const uav_study_t *s, const uav_track_t *track, const uav_clouds_t *clouds, model_t *model)
 {
     const float inv_sigma = (float)(1.0 / s->set.sigma_fix_m);
@@ -83,6 +112,9 @@ static void make_model(const uav_study_t *s, const uav_track_t *track, const uav
     };
     model->sensor.loglik = s->distance ? pfl_position_distance_loglik : pfl_position_loglik;
     model->sensor.user = &model->position;
+    if (s->optimal) {
+        set_proposal(s, model);
+    }
 }
 
 static void make_config(const uav_study_t *s, uint32_t stream, model_t *model)
@@ -103,7 +135,7 @@ static void make_config(const uav_study_t *s, uint32_t stream, model_t *model)
         .seed = host_random_u64(&random),
         .sensors = &model->sensor,
         .kernel = s->kernel ? &model->kernel : NULL,
-        .predict = pfl_autopilot_predict,
+        .predict = s->optimal ? predict_optimal : pfl_autopilot_predict,
         .draw = draw_start,
         .user = model,
     };
@@ -179,6 +211,7 @@ static bool look(const model_t *model, pfl_t *filter, const uav_track_t *track, 
 typedef struct {
     const uav_study_t *study;
     pfl_autopilot_input_t wanted;
+    pfl_proposal_input_t without_fix;
 } pilot_t;
 
 static const void *pilot_input(void *user, uint32_t step, uint64_t t_us)
@@ -187,7 +220,8 @@ static const void *pilot_input(void *user, uint32_t step, uint64_t t_us)
 
     (void)step;
     pilot->wanted = uav_reference(pilot->study, (unsigned)(t_us / UAV_PERIOD_US));
-    return &pilot->wanted;
+    pilot->without_fix = (pfl_proposal_input_t){&pilot->wanted, NULL};
+    return pilot->study->optimal ? (const void *)&pilot->without_fix : (const void *)&pilot->wanted;
 }
 
 static bool reach_of(const pfl_t *ahead, const uav_belief_t *last, unsigned k, double *reach_m, failure_t *failure)
@@ -269,9 +303,11 @@ static bool cycle(const uav_study_t *s, pfl_t *filter, const uav_track_t *track,
     const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
     const uint64_t t_us = (uint64_t)k * UAV_PERIOD_US;
     const pfl_autopilot_input_t wanted = uav_reference(s, k - 1u);
+    const pfl_proposal_input_t with_fix = {&wanted, uav_has_fix(s, k) ? track->z[k] : NULL};
+    const void *u = s->optimal ? (const void *)&with_fix : (const void *)&wanted;
     pfl_health_t health;
 
-    if (!check(pfl_predict(filter, t_us, &wanted), "pfl_predict", k, failure) ||
+    if (!check(pfl_predict(filter, t_us, u), "pfl_predict", k, failure) ||
         (uav_has_fix(s, k) && !check(pfl_update(filter, 0u, t_us, track->z[k]), "pfl_update", k, failure)) ||
         !check(pfl_health(filter, &health), "pfl_health", k, failure)) {
         return false;

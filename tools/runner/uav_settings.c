@@ -14,6 +14,7 @@ const setting_t uav_settings[UAV_SETTINGS] = {
     {"kernel", "auto|on|off", 0.0, 0.0, "auto", "pf: kernel step of width 0.5 after resampling"},
     {"scheme", "auto|systematic|stratified|residual|multinomial", 0.0, 0.0, "auto", "pf: the resampling scheme"},
     {"nlim", "auto|#", 0.0, 1.0, "auto", "pf: resample when the effective sample size < nlim N"},
+    {"proposal", "prior|optimal", 0.0, 0.0, "prior", "pf: optimal: particles move to where the fix says"},
     {"weighting", "gauss|distance", 0.0, 0.0, "gauss", "pf: distance: by the inverse squared distance"},
     {"fixes", "on|off", 0.0, 0.0, "on", "off: the filter gets none"},
     {"kc", "auto|#", 0.0, 59.0, "auto", "forecast, wind: the whole second at which the forecast begins"},
@@ -113,6 +114,7 @@ static void read_filter(const study_t *study, uav_study_t *s)
         s->resample_below = study_number(study, "nlim");
     }
     s->resampling = study_is(study, "resampling", "on");
+    s->optimal = study_is(study, "proposal", "optimal");
     s->distance = study_is(study, "weighting", "distance");
     s->fixes = study_is(study, "fixes", "on");
 }
@@ -151,7 +153,7 @@ static bool is_as_page(const uav_study_t *s)
     set_page_resampling(&page);
     return s->set.name == page.set.name && s->wind_model == page.wind_model && s->resampling &&
            s->scheme == page.scheme && near(s->resample_below, page.resample_below) && s->kernel == page.kernel &&
-           !s->distance && s->fixes && s->filter_seconds == page.filter_seconds;
+           !s->optimal && !s->distance && s->fixes && s->filter_seconds == page.filter_seconds;
 }
 
 bool uav_read_settings(const study_t *study, uav_study_t *s, failure_t *failure)
@@ -171,6 +173,11 @@ bool uav_read_settings(const study_t *study, uav_study_t *s, failure_t *failure)
     read_filter(study, s);
     if (!read_kc(study, s, failure)) {
         return false;
+    }
+    if (s->optimal && (s->distance || s->sim == UAV_REPLAY)) {
+        return fail(failure, EXIT_USAGE,
+                    "--set proposal=optimal: for weighting=gauss, and not for sim=replay, where "
+                    "the gusts act on the heading too");
     }
     s->as_page = is_as_page(s);
     return true;

@@ -4,7 +4,7 @@
 
 #include "uav_trajectory.h"
 
-enum { UAV_SETTINGS = 11 };
+enum { UAV_SETTINGS = 12 };
 extern const setting_t uav_settings[UAV_SETTINGS];
 
 /* False with the failure filled in where settings contradict each other. */

@@ -53,6 +53,7 @@ typedef struct {
     pfl_resampling_t scheme;
     double resample_below; /* share of N */
     bool kernel;
+    bool optimal;  /* the optimal proposal instead of the gusts as they are */
     bool distance; /* weights by the inverse squared distance */
     bool fixes;
     unsigned seconds;        /* of the world */

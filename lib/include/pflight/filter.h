@@ -107,10 +107,11 @@ typedef struct {
     uint32_t timeout_us;   /* with a watch: not fused for longer than this is stale, and degrades; 0: never */
     uint16_t z_bytes;      /* with a watch: size of *z, so that a measurement whose content stands still or comes twice
                               is seen; 0: not looked at */
-    uint16_t frozen_after; /* refuse from the so-manieth repetition of the same content on; 0: never */
+    uint16_t frozen_after; /* refuse the same content from this repetition on; 0: never */
 } pfl_sensor_t;
 
-/* How offspring are chosen; all four are unbiased and exact in integers. */
+/* How offspring are chosen; all four are unbiased and exact in integers. Systematic is the cheapest and as accurate as
+ * any; with multinomial the same error costs up to half as much again (measured: docs/tuning.md). */
 typedef enum {
     PFL_RESAMPLE_SYSTEMATIC = 0, /* one random number, evenly spaced points (Kitagawa 1996); O(N) */
     PFL_RESAMPLE_STRATIFIED = 1, /* one random number in each of N strata (Kitagawa 1996); O(N) */
@@ -185,7 +186,10 @@ pfl_status_t pfl_watch_keep(pfl_t *f, uint32_t what, uint32_t number, const void
 
 #define PFL_WATCH_BYTES(sensors) (32u * (size_t)(sensors))
 
-/* Constant while the filter lives; may be in flash. A zeroed field means what its comment says. */
+/* What is worth choosing, measured: docs/tuning.md. An ess_ratio of 0.5 is best or near it nearly everywhere;
+ * pflight/antithetic.h and pflight/proposal.h reach the same error for fewer instructions.
+ *
+ * Constant while the filter lives; may be in flash. A zeroed field means what its comment says. */
 typedef struct {
     uint32_t abi;           /* PFL_ABI */
     uint32_t particles;     /* N, 1 .. PFL_PARTICLES_MAX */

@@ -2,6 +2,7 @@
 #ifndef PFLIGHT_PFLIGHT_H
 #define PFLIGHT_PFLIGHT_H
 
+#include "pflight/antithetic.h"
 #include "pflight/constraints.h"
 #include "pflight/filter.h"
 #include "pflight/guidance.h"
@@ -10,6 +11,7 @@
 #include "pflight/models.h"
 #include "pflight/per_particle.h"
 #include "pflight/port.h"
+#include "pflight/proposal.h"
 #include "pflight/rng.h"
 #include "pflight/sensors.h"
 #include "pflight/status.h"
