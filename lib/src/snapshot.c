@@ -36,6 +36,17 @@ static uint32_t get_word(const unsigned char *at)
     return (uint32_t)at[0] | ((uint32_t)at[1] << 8) | ((uint32_t)at[2] << 16) | ((uint32_t)at[3] << 24);
 }
 
+/* Word k of a snapshot, as it is and as a float. */
+static uint32_t word_of(const unsigned char *at, size_t k)
+{
+    return get_word(&at[4u * k]);
+}
+
+static float float_of(const unsigned char *at, size_t k)
+{
+    return pfl_from_bits((int32_t)word_of(at, k));
+}
+
 /* CRC-32 (reflected 0xEDB88320), bit by bit: no table to keep. */
 static uint32_t crc32(const unsigned char *bytes, size_t n)
 {
@@ -52,19 +63,17 @@ static uint32_t crc32(const unsigned char *bytes, size_t n)
 static unsigned char *put_floats(unsigned char *at, const float *x, size_t n)
 {
     for (size_t i = 0u; i < n; i++) {
-        put_word(at, pfl_load_u32(&x[i]));
-        at += 4;
+        put_word(&at[4u * i], pfl_load_u32(&x[i]));
     }
-    return at;
+    return &at[4u * n];
 }
 
 static const unsigned char *get_floats(const unsigned char *at, float *x, size_t n)
 {
     for (size_t i = 0u; i < n; i++) {
-        pfl_store_u32(&x[i], get_word(at));
-        at += 4;
+        pfl_store_u32(&x[i], word_of(at, i));
     }
-    return at;
+    return &at[4u * n];
 }
 
 static void head_of(const pfl_t *f, uint32_t head[HEAD_WORDS])
@@ -97,7 +106,7 @@ static void head_of(const pfl_t *f, uint32_t head[HEAD_WORDS])
                                         f->redrawn,
                                         f->projected,
                                         f->best_index};
-    memcpy(head, words, sizeof words);
+    (void)memcpy(head, words, sizeof words);
 }
 
 size_t pfl_snapshot_bytes(const pfl_t *f)
@@ -123,15 +132,14 @@ pfl_status_t pfl_snapshot(const pfl_t *f, void *buffer, size_t buffer_bytes)
     head_of(f, head);
     unsigned char *at = (unsigned char *)buffer;
     for (uint32_t k = 0u; k < HEAD_WORDS; k++) {
-        put_word(at, head[k]);
-        at += 4;
+        put_word(&at[4u * k], head[k]);
     }
+    at = &at[4u * HEAD_WORDS];
     for (uint32_t k = 0u; k < RNG_WORDS; k++) {
-        put_word(at, (k < (4u * PFL_RNG_LANES)) ? f->rng.s[k / PFL_RNG_LANES][k % PFL_RNG_LANES]
-                                                : f->rng.one[k - (4u * PFL_RNG_LANES)]);
-        at += 4;
+        put_word(&at[4u * k], (k < (4u * PFL_RNG_LANES)) ? f->rng.s[k / PFL_RNG_LANES][k % PFL_RNG_LANES]
+                                                         : f->rng.one[k - (4u * PFL_RNG_LANES)]);
     }
-    at = put_floats(at, f->mean, moment_words(states));
+    at = put_floats(&at[4u * RNG_WORDS], f->mean, moment_words(states));
     for (size_t d = 0u; d < states; d++) {
         at = put_floats(at, &f->x[d * f->stride], f->config->particles);
     }
@@ -142,74 +150,83 @@ pfl_status_t pfl_snapshot(const pfl_t *f, void *buffer, size_t buffer_bytes)
 
 /* ---- Restore -------------------------------------------------------------------------------------------------- */
 
-static bool head_fits(const pfl_t *f, const unsigned char *at)
+static bool shape_fits(const pfl_config_t *c, const unsigned char *at)
 {
-    const float top = pfl_from_bits((int32_t)get_word(at + (4 * 11)));
-    const float sum = pfl_from_bits((int32_t)get_word(at + (4 * 12)));
-    const float ratio = pfl_from_bits((int32_t)get_word(at + (4 * 13)));
-    const float ess = pfl_from_bits((int32_t)get_word(at + (4 * 14)));
-    const bool shape = (get_word(at) == SNAPSHOT_MAGIC) && (get_word(at + 4) == SNAPSHOT_VERSION) &&
-                       (get_word(at + 8) == f->config->particles) && (get_word(at + 12) == f->config->states) &&
-                       (get_word(at + 16) == f->config->noises) && (get_word(at + (4 * 24)) == f->config->moments);
-    const bool numbers = pfl_is_finite(top) && pfl_is_finite(sum) && pfl_is_finite(ratio) && pfl_is_finite(ess);
-    return shape && numbers && (sum > 0.0f) && (ess >= 1.0f) && (ess <= (float)f->config->particles) &&
-           (get_word(at + (4 * 15)) <= MOMENTS_OVERFLOWED) && (get_word(at + (4 * 16)) <= 1u) &&
-           (get_word(at + (4 * 27)) < f->config->particles);
+    return (word_of(at, 0u) == SNAPSHOT_MAGIC) && (word_of(at, 1u) == SNAPSHOT_VERSION) &&
+           (word_of(at, 2u) == c->particles) && (word_of(at, 3u) == c->states) && (word_of(at, 4u) == c->noises) &&
+           (word_of(at, 24u) == c->moments);
+}
+
+/* A float between the two, both included; NaN is not. */
+static bool lies_within(float x, float lo, float hi)
+{
+    return pfl_is_not_nan(x) && (x >= lo) && (x <= hi);
+}
+
+static bool head_is_good(const pfl_config_t *c, const unsigned char *at)
+{
+    return pfl_is_finite(float_of(at, 11u)) && lies_within(float_of(at, 12u), FLT_MIN, FLT_MAX) &&
+           pfl_is_finite(float_of(at, 13u)) && lies_within(float_of(at, 14u), 1.0f, (float)c->particles) &&
+           (word_of(at, 15u) <= MOMENTS_OVERFLOWED) && (word_of(at, 16u) <= 1u) && (word_of(at, 27u) < c->particles);
+}
+
+static void get_streams(pfl_rng_t *rng, const unsigned char *at)
+{
+    for (uint32_t k = 0u; k < RNG_WORDS; k++) {
+        uint32_t *word = (k < (4u * PFL_RNG_LANES)) ? &rng->s[k / PFL_RNG_LANES][k % PFL_RNG_LANES]
+                                                    : &rng->one[k - (4u * PFL_RNG_LANES)];
+        *word = word_of(at, k);
+    }
 }
 
 /* Streams alive, moments and states finite, log-weights below their top. */
 static bool body_is_good(const pfl_t *f, const unsigned char *at)
 {
-    const float top = pfl_from_bits((int32_t)get_word(at + (4 * 11)));
+    const float top = float_of(at, 11u);
     const size_t states = f->config->states;
     const size_t finite = moment_words(states) + (states * f->config->particles);
+    const unsigned char *streams = &at[4u * HEAD_WORDS];
+    const unsigned char *numbers = &streams[4u * RNG_WORDS];
+    const unsigned char *weights = &numbers[4u * finite];
     pfl_rng_t rng;
-    for (uint32_t k = 0u; k < (4u * PFL_RNG_LANES); k++) {
-        rng.s[k / PFL_RNG_LANES][k % PFL_RNG_LANES] = get_word(at + (4u * (HEAD_WORDS + k)));
-    }
-    for (uint32_t k = 0u; k < 4u; k++) {
-        rng.one[k] = get_word(at + (4u * (HEAD_WORDS + (4u * PFL_RNG_LANES) + k)));
-    }
-    bool good = pfl_rng_alive(&rng);
-    const unsigned char *next = at + (4u * (HEAD_WORDS + RNG_WORDS));
+    uint32_t bad = 0u;
+    get_streams(&rng, streams);
     for (size_t k = 0u; k < finite; k++) {
-        good = good && pfl_is_finite(pfl_from_bits((int32_t)get_word(next)));
-        next += 4;
+        bad |= pfl_is_finite(float_of(numbers, k)) ? 0u : 1u;
     }
-    for (uint32_t i = 0u; i < f->config->particles; i++) {
-        const float relative = pfl_from_bits((int32_t)get_word(next)) - top;
-        good = good && pfl_is_not_nan(relative) && (relative <= 0.0f);
-        next += 4;
+    for (size_t i = 0u; i < f->config->particles; i++) {
+        const float relative = float_of(weights, i) - top;
+        bad |= (pfl_is_not_nan(relative) && (relative <= 0.0f)) ? 0u : 1u;
     }
-    return good;
+    return pfl_rng_alive(&rng) && (bad == 0u);
 }
 
-static uint64_t get_time(const unsigned char *at)
+static uint64_t time_of(const unsigned char *at, size_t k)
 {
-    return (uint64_t)get_word(at) | ((uint64_t)get_word(at + 4) << 32);
+    return (uint64_t)word_of(at, k) | ((uint64_t)word_of(at, k + 1u) << 32);
 }
 
 static void take_head(pfl_t *f, const unsigned char *at)
 {
-    f->t_us = get_time(at + (4 * 5));
-    f->reset_t_us = get_time(at + (4 * 7));
-    f->t_fused_us = get_time(at + (4 * 9));
-    f->log_weight_top = pfl_from_bits((int32_t)get_word(at + (4 * 11)));
-    f->weight_sum = pfl_from_bits((int32_t)get_word(at + (4 * 12)));
-    f->test_ratio = pfl_from_bits((int32_t)get_word(at + (4 * 13)));
-    f->ess = pfl_from_bits((int32_t)get_word(at + (4 * 14)));
-    f->moments_current = get_word(at + (4 * 15));
-    f->resample_pending = get_word(at + (4 * 16));
-    f->fused = get_word(at + (4 * 17));
-    f->rejected = get_word(at + (4 * 18));
-    f->faulted = get_word(at + (4 * 19));
-    f->resampled = get_word(at + (4 * 20));
-    f->quarantined = get_word(at + (4 * 21));
-    f->resets = get_word(at + (4 * 22));
-    f->overruns = get_word(at + (4 * 23));
-    f->redrawn = get_word(at + (4 * 25));
-    f->projected = get_word(at + (4 * 26));
-    f->best_index = get_word(at + (4 * 27));
+    f->t_us = time_of(at, 5u);
+    f->reset_t_us = time_of(at, 7u);
+    f->t_fused_us = time_of(at, 9u);
+    f->log_weight_top = float_of(at, 11u);
+    f->weight_sum = float_of(at, 12u);
+    f->test_ratio = float_of(at, 13u);
+    f->ess = float_of(at, 14u);
+    f->moments_current = word_of(at, 15u);
+    f->resample_pending = word_of(at, 16u);
+    f->fused = word_of(at, 17u);
+    f->rejected = word_of(at, 18u);
+    f->faulted = word_of(at, 19u);
+    f->resampled = word_of(at, 20u);
+    f->quarantined = word_of(at, 21u);
+    f->resets = word_of(at, 22u);
+    f->overruns = word_of(at, 23u);
+    f->redrawn = word_of(at, 25u);
+    f->projected = word_of(at, 26u);
+    f->best_index = word_of(at, 27u);
     f->scratch_is_weights = 0u;
 }
 
@@ -224,20 +241,14 @@ pfl_status_t pfl_restore(pfl_t *f, const void *buffer, size_t buffer_bytes)
     }
     const unsigned char *at = (const unsigned char *)buffer;
     const size_t bytes = pfl_snapshot_bytes(f);
-    if ((buffer_bytes < bytes) || !head_fits(f, at) || (get_word(at + (bytes - 4u)) != crc32(at, bytes - 4u)) ||
-        !body_is_good(f, at)) {
+    if ((buffer_bytes < bytes) || !shape_fits(f->config, at) || !head_is_good(f->config, at) ||
+        (get_word(&at[bytes - 4u]) != crc32(at, bytes - 4u)) || !body_is_good(f, at)) {
         return PFL_ERR_CORRUPT;
     }
     const size_t states = f->config->states;
     take_head(f, at);
-    at += 4u * HEAD_WORDS;
-    for (uint32_t k = 0u; k < RNG_WORDS; k++) {
-        uint32_t *word = (k < (4u * PFL_RNG_LANES)) ? &f->rng.s[k / PFL_RNG_LANES][k % PFL_RNG_LANES]
-                                                    : &f->rng.one[k - (4u * PFL_RNG_LANES)];
-        *word = get_word(at);
-        at += 4;
-    }
-    at = get_floats(at, f->mean, moment_words(states));
+    get_streams(&f->rng, &at[4u * HEAD_WORDS]);
+    at = get_floats(&at[4u * (HEAD_WORDS + RNG_WORDS)], f->mean, moment_words(states));
     for (size_t d = 0u; d < states; d++) {
         at = get_floats(at, &f->x[d * f->stride], f->config->particles);
     }
