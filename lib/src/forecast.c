@@ -56,7 +56,7 @@ static pfl_status_t start(const pfl_t *f, void *arena, size_t arena_bytes, const
     return (wants_cov && !has_cov) ? PFL_ERR_CONFIG : pfl_resample(*out);
 }
 
-static pfl_status_t step(pfl_t *copy, const pfl_horizon_t *horizon, uint32_t k, float *mean, float *cov)
+static pfl_status_t look_ahead(pfl_t *copy, const pfl_horizon_t *horizon, uint32_t k, float *mean, float *cov)
 {
     const uint64_t t_us = copy->t_us;
     const void *u = (horizon->control != NULL) ? horizon->control(horizon->control_user, k, t_us) : NULL;
@@ -82,7 +82,7 @@ pfl_status_t pfl_forecast(const pfl_t *f, void *arena, size_t arena_bytes, const
     const size_t states = copy->config->states;
     for (uint32_t k = 0u; (k < horizon->steps) && (worst >= PFL_OK); k++) {
         const pfl_status_t status =
-            step(copy, horizon, k, &mean[k * states], (cov != NULL) ? &cov[k * states * states] : NULL);
+            look_ahead(copy, horizon, k, &mean[k * states], (cov != NULL) ? &cov[k * states * states] : NULL);
         worst = (status != PFL_OK) ? status : worst;
     }
     if (out != NULL) {

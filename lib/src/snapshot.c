@@ -9,8 +9,9 @@
 
 #define SNAPSHOT_MAGIC 0x73706670u /* "pfps" */
 #define SNAPSHOT_VERSION 1u
-#define HEAD_WORDS 28u
-#define RNG_WORDS ((4u * PFL_RNG_LANES) + 4u)
+#define HEAD_WORDS ((size_t)28u)
+#define LANE_WORDS ((size_t)4u * PFL_RNG_LANES)
+#define RNG_WORDS (LANE_WORDS + 4u)
 
 static size_t moment_words(size_t states)
 {
@@ -131,13 +132,13 @@ pfl_status_t pfl_snapshot(const pfl_t *f, void *buffer, size_t buffer_bytes)
     uint32_t head[HEAD_WORDS];
     head_of(f, head);
     unsigned char *at = (unsigned char *)buffer;
-    for (uint32_t k = 0u; k < HEAD_WORDS; k++) {
+    for (size_t k = 0u; k < HEAD_WORDS; k++) {
         put_word(&at[4u * k], head[k]);
     }
     at = &at[4u * HEAD_WORDS];
-    for (uint32_t k = 0u; k < RNG_WORDS; k++) {
-        put_word(&at[4u * k], (k < (4u * PFL_RNG_LANES)) ? f->rng.s[k / PFL_RNG_LANES][k % PFL_RNG_LANES]
-                                                         : f->rng.one[k - (4u * PFL_RNG_LANES)]);
+    for (size_t k = 0u; k < RNG_WORDS; k++) {
+        put_word(&at[4u * k],
+                 (k < LANE_WORDS) ? f->rng.s[k / PFL_RNG_LANES][k % PFL_RNG_LANES] : f->rng.one[k - LANE_WORDS]);
     }
     at = put_floats(&at[4u * RNG_WORDS], f->mean, moment_words(states));
     for (size_t d = 0u; d < states; d++) {
@@ -172,10 +173,11 @@ static bool head_is_good(const pfl_config_t *c, const unsigned char *at)
 
 static void get_streams(pfl_rng_t *rng, const unsigned char *at)
 {
-    for (uint32_t k = 0u; k < RNG_WORDS; k++) {
-        uint32_t *word = (k < (4u * PFL_RNG_LANES)) ? &rng->s[k / PFL_RNG_LANES][k % PFL_RNG_LANES]
-                                                    : &rng->one[k - (4u * PFL_RNG_LANES)];
-        *word = word_of(at, k);
+    for (size_t k = 0u; k < LANE_WORDS; k++) {
+        rng->s[k / PFL_RNG_LANES][k % PFL_RNG_LANES] = word_of(at, k);
+    }
+    for (size_t k = 0u; k < 4u; k++) {
+        rng->one[k] = word_of(at, LANE_WORDS + k);
     }
 }
 

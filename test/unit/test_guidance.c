@@ -567,6 +567,12 @@ void test_nmpc_cost_and_solve_refuse_each_bad_argument_alone(void)
     TEST_ASSERT_EQUAL_INT(PFL_ERR_NONFINITE, pfl_nmpc_cost(&nmpc, &good, &plan, &cost, NULL));
     TEST_ASSERT_EQUAL_FLOAT(7.0f, cost);
     plan.speed_mps[1] = 15.0f;
+    pfl_nmpc_t steep = nmpc; /* the cost is finite, its slope is not: a small error under a huge weight, and a long way */
+    steep.distance_weight_last = 3e38f;
+    steep.dt_s = 3.0f;
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_NONFINITE, pfl_nmpc_cost(&steep, &good, &plan, &cost, NULL));
+    TEST_ASSERT_EQUAL_FLOAT(7.0f, cost);
+    plan = constant_plan(15.0f, 0.5f);
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_solve(&nmpc, &good, &plan, NULL)); /* a report is not wanted */
 }
 
