@@ -317,14 +317,13 @@ void test_a_fork_retries_in_its_own_memory(void)
 {
     const pfl_constraint_t constraint = {inside, project, NULL, 8u};
     const pfl_config_t config = config_of(100u, &constraint);
-    pfl_t *f = ut_filter(&config);
+    pfl_t *f = fly(&config);
     const size_t bytes = pfl_arena_bytes(&config);
     void *arena = ut_arena(bytes);
     pfl_t *copy = NULL;
     pfl_health_t health;
     pfl_view_t view;
 
-    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_predict(f, 1000u, NULL));
     const unsigned char *before = ut_snapshot(f);
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_fork(f, arena, bytes, &copy));
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_health(copy, &health));
