@@ -26,12 +26,12 @@ static comb_t comb_of(uint32_t count, uint32_t total)
     const uint64_t rest = ((uint64_t)count << 31) % total;
     uint64_t m = (high << 32) | ((rest << 32) / total); /* count 2^63 / total */
     uint32_t fraction = 63u;
-    while (m >= (1ull << 31)) {
+    while (m >= (1ULL << 31)) {
         m >>= 1;
         fraction--;
     }
     m += 1u;
-    if (m >= (1ull << 31)) {
+    if (m >= (1ULL << 31)) {
         m >>= 1;
         fraction--;
     }
