@@ -93,5 +93,7 @@ void pfl_ring_nearest(const pfl_ring_t *ring, float *x_m, float *y_m)
         const float scale = ((r < ring->inner_m) ? ring->inner_m : ring->outer_m) / r;
         *x_m = ring->center_x_m + (dx * scale);
         *y_m = ring->center_y_m + (dy * scale);
+    } else {
+        /* on the ring already */
     }
 }

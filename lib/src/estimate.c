@@ -175,7 +175,7 @@ bool pfl_invariants_hold(const pfl_t *f)
     bool reached = f->weights_equal != 0u; /* the top, by a log-weight: else all weights could be zero */
     for (uint32_t i = 0u; (f->weights_equal == 0u) && (i < count); i++) {
         const float relative = f->log_weight[i] - f->log_weight_top;
-        hold = hold && (relative <= 0.0f) && pfl_is_not_nan(relative);
+        hold = hold && pfl_is_not_nan(relative) && (relative <= 0.0f);
         reached = reached || (relative >= 0.0f);
     }
     return hold && reached;

@@ -22,7 +22,8 @@ static inline bool pfl_uav_is_good(const pfl_uav_t *u)
 
 static inline bool pfl_target_is_good(const pfl_target_t *t)
 {
-    return pfl_is_finite(t->x_m) && pfl_is_finite(t->y_m) && pfl_is_finite(t->vx_mps) && pfl_is_finite(t->vy_mps);
+    return (t != NULL) && pfl_is_finite(t->x_m) && pfl_is_finite(t->y_m) && pfl_is_finite(t->vx_mps) &&
+           pfl_is_finite(t->vy_mps);
 }
 
 static inline bool pfl_limits_are_good(const pfl_uav_limits_t *l)

@@ -6,13 +6,21 @@
 
 #define TWO_PI 6.28318531f
 
+static bool rule_is_good(const pfl_standoff_t *rule)
+{
+    return (rule->reach_gain > 0.0f) && (rule->min_m > 0.0f) && (rule->min_m < rule->max_m) &&
+           pfl_is_finite(rule->max_m) && (rule->rate_max_mps > 0.0f);
+}
+
+static bool step_is_good(const pfl_standoff_t *standoff, float reach_m, float dt_s, const pfl_standoff_state_t *state)
+{
+    return (standoff != NULL) && (state != NULL) && (reach_m >= 0.0f) && (dt_s > 0.0f) && pfl_is_finite(dt_s) &&
+           rule_is_good(standoff) && pfl_is_finite(state->distance_m);
+}
+
 pfl_status_t pfl_standoff_step(const pfl_standoff_t *standoff, float reach_m, float dt_s, pfl_standoff_state_t *state)
 {
-    if ((standoff == NULL) || (state == NULL) || !(reach_m >= 0.0f) || !(dt_s > 0.0f) || !pfl_is_finite(dt_s)) {
-        return PFL_ERR_ARG;
-    }
-    if (!(standoff->reach_gain > 0.0f) || !(standoff->min_m > 0.0f) || !(standoff->min_m < standoff->max_m) ||
-        !pfl_is_finite(standoff->max_m) || !(standoff->rate_max_mps > 0.0f) || !pfl_is_finite(state->distance_m)) {
+    if (!step_is_good(standoff, reach_m, dt_s, state)) {
         return PFL_ERR_ARG;
     }
     const float wanted = pfl_clip(standoff->reach_gain * reach_m, standoff->min_m, standoff->max_m);
@@ -64,43 +72,54 @@ static field_t field_at(const pfl_lvfg_t *g, const pfl_uav_t *uav, const pfl_tar
     return field;
 }
 
-static bool inputs_are_good(const pfl_lvfg_t *g, const pfl_uav_t *uav, uint32_t count, const pfl_target_t *target,
-                            const pfl_standoff_state_t *standoff)
+static bool settings_are_good(const pfl_lvfg_t *g, const pfl_standoff_state_t *standoff)
 {
-    bool good = pfl_limits_are_good(&g->limits) && pfl_is_finite(g->turn_gain) && pfl_is_finite(g->phase_gain) &&
-                pfl_target_is_good(target) && pfl_is_finite(standoff->distance_m) && (standoff->distance_m > 0.0f) &&
-                pfl_is_finite(standoff->rate_mps) && (count >= 1u) && (count <= 2u);
+    return (g != NULL) && pfl_limits_are_good(&g->limits) && pfl_is_finite(g->turn_gain) &&
+           pfl_is_finite(g->phase_gain) && (standoff != NULL) && pfl_is_finite(standoff->distance_m) &&
+           (standoff->distance_m > 0.0f) && pfl_is_finite(standoff->rate_mps);
+}
+
+static bool uavs_are_good(const pfl_uav_t *uav, uint32_t count, const pfl_planar_uav_input_t *command)
+{
+    bool good = (uav != NULL) && (command != NULL) && (count >= 1u) && (count <= 2u);
     for (uint32_t i = 0u; good && (i < count); i++) {
         good = pfl_uav_is_good(&uav[i]);
     }
     return good;
 }
 
+/* How much faster the first of two is to fly, and slower the second: its gap to the first is to be pi. */
+static float faster_of(const pfl_lvfg_t *g, float first_rad, float second_rad, float distance_m)
+{
+    const float wrapped = pfl_wrap_pi_kernel(second_rad - first_rad);
+    const float gap = (wrapped < 0.0f) ? (wrapped + TWO_PI) : wrapped; /* in [0, 2 pi] */
+    return g->phase_gain * ((gap - 3.14159265f) * distance_m);
+}
+
+static pfl_planar_uav_input_t clipped(const pfl_uav_limits_t *l, float speed, float turn)
+{
+    pfl_planar_uav_input_t command;
+    command.speed_mps = pfl_clip(speed, l->cruise_mps - l->speed_range_mps, l->cruise_mps + l->speed_range_mps);
+    command.turn_radps = pfl_clip(turn, -l->turn_max_radps, l->turn_max_radps);
+    return command;
+}
+
 pfl_status_t pfl_lvfg_command(const pfl_lvfg_t *lvfg, const pfl_uav_t *uav, uint32_t count, const pfl_target_t *target,
                               const pfl_standoff_state_t *standoff, pfl_planar_uav_input_t *command)
 {
-    if ((lvfg == NULL) || (uav == NULL) || (target == NULL) || (standoff == NULL) || (command == NULL) ||
-        !inputs_are_good(lvfg, uav, count, target, standoff)) {
+    if (!settings_are_good(lvfg, standoff) || !uavs_are_good(uav, count, command) || !pfl_target_is_good(target)) {
         return PFL_ERR_ARG;
     }
-    const pfl_uav_limits_t *limits = &lvfg->limits;
+    const bool pair = count == 2u;
     const field_t first = field_at(lvfg, &uav[0], target, standoff);
-    const field_t second = (count == 2u) ? field_at(lvfg, &uav[1], target, standoff) : first;
-    float faster = 0.0f;
-    if (count == 2u) { /* the gap of the second to the first, in [0, 2 pi], is to be pi */
-        const float wrapped = pfl_wrap_pi_kernel(second.angle - first.angle);
-        const float gap = (wrapped < 0.0f) ? (wrapped + TWO_PI) : wrapped;
-        faster = lvfg->phase_gain * ((gap - 3.14159265f) * standoff->distance_m);
-    }
+    const field_t second = pair ? field_at(lvfg, &uav[1], target, standoff) : first;
+    const float faster = pair ? faster_of(lvfg, first.angle, second.angle, standoff->distance_m) : 0.0f;
     if (!pfl_is_finite(first.turn) || !pfl_is_finite(second.turn) || !pfl_is_finite(faster)) {
         return PFL_ERR_NONFINITE;
     }
-    for (uint32_t i = 0u; i < count; i++) {
-        const float speed = limits->cruise_mps + ((i == 0u) ? faster : -faster);
-        const float turn = (i == 0u) ? first.turn : second.turn;
-        command[i].speed_mps =
-            pfl_clip(speed, limits->cruise_mps - limits->speed_range_mps, limits->cruise_mps + limits->speed_range_mps);
-        command[i].turn_radps = pfl_clip(turn, -limits->turn_max_radps, limits->turn_max_radps);
+    command[0] = clipped(&lvfg->limits, lvfg->limits.cruise_mps + faster, first.turn);
+    if (pair) {
+        command[1] = clipped(&lvfg->limits, lvfg->limits.cruise_mps - faster, second.turn);
     }
     return PFL_OK;
 }

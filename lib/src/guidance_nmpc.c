@@ -311,6 +311,9 @@ static pfl_nmpc_report_t descend(const context_t *c)
 
 static bool settings_are_good(const pfl_nmpc_t *g)
 {
+    if (g == NULL) {
+        return false;
+    }
     const float sum = ((g->distance_weight + g->phase_weight) + (g->distance_weight_last + g->phase_weight_last)) +
                       ((g->speed_weight + g->turn_weight) + (g->penalty + g->turn_nominal_radps));
     return pfl_limits_are_good(&g->limits) && pfl_is_finite(sum) && pfl_is_finite(g->dt_s) && (g->dt_s > 0.0f) &&
@@ -329,7 +332,7 @@ static bool numbers_are_finite(const float *a, const float *b, uint32_t n)
 
 static bool plan_is_good(const pfl_nmpc_plan_t *plan)
 {
-    return numbers_are_finite(plan->speed_mps, plan->turn_radps, STEPS);
+    return (plan != NULL) && numbers_are_finite(plan->speed_mps, plan->turn_radps, STEPS);
 }
 
 static bool path_is_good(const pfl_nmpc_path_t *path)
@@ -339,9 +342,9 @@ static bool path_is_good(const pfl_nmpc_path_t *path)
 
 static bool problem_is_good(const pfl_nmpc_problem_t *problem)
 {
-    return pfl_uav_is_good(&problem->uav) && (problem->target != NULL) && path_is_good(problem->target) &&
-           ((problem->pair == NULL) || path_is_good(problem->pair)) && pfl_is_finite(problem->distance_m) &&
-           (problem->distance_m > 0.0f);
+    return (problem != NULL) && pfl_uav_is_good(&problem->uav) && (problem->target != NULL) &&
+           path_is_good(problem->target) && ((problem->pair == NULL) || path_is_good(problem->pair)) &&
+           pfl_is_finite(problem->distance_m) && (problem->distance_m > 0.0f);
 }
 
 void pfl_nmpc_shift(pfl_nmpc_plan_t *plan)
@@ -357,8 +360,7 @@ pfl_status_t pfl_nmpc_rollout(const pfl_nmpc_t *nmpc, const pfl_uav_t *uav, cons
                               pfl_nmpc_path_t *path, pfl_uav_t *last)
 {
     flight_t flight;
-    if ((nmpc == NULL) || (uav == NULL) || (plan == NULL) || (path == NULL) || !settings_are_good(nmpc) ||
-        !pfl_uav_is_good(uav) || !plan_is_good(plan)) {
+    if ((uav == NULL) || (path == NULL) || !settings_are_good(nmpc) || !pfl_uav_is_good(uav) || !plan_is_good(plan)) {
         return PFL_ERR_ARG;
     }
     fly(nmpc, uav, plan, &flight);
@@ -377,8 +379,7 @@ pfl_status_t pfl_nmpc_rollout(const pfl_nmpc_t *nmpc, const pfl_uav_t *uav, cons
 pfl_status_t pfl_nmpc_extrapolate(const pfl_nmpc_t *nmpc, const pfl_target_t *target, pfl_nmpc_path_t *path)
 {
     pfl_nmpc_path_t line;
-    if ((nmpc == NULL) || (target == NULL) || (path == NULL) || !pfl_target_is_good(target) ||
-        !pfl_is_finite(nmpc->dt_s)) {
+    if ((nmpc == NULL) || (path == NULL) || !pfl_target_is_good(target) || !pfl_is_finite(nmpc->dt_s)) {
         return PFL_ERR_ARG;
     }
     for (uint32_t k = 0u; k <= STEPS; k++) {
@@ -396,8 +397,8 @@ pfl_status_t pfl_nmpc_extrapolate(const pfl_nmpc_t *nmpc, const pfl_target_t *ta
 pfl_status_t pfl_nmpc_cost(const pfl_nmpc_t *nmpc, const pfl_nmpc_problem_t *problem, const pfl_nmpc_plan_t *plan,
                            pfl_nmpc_work_t *work, float *cost, pfl_nmpc_plan_t *gradient)
 {
-    if ((nmpc == NULL) || (problem == NULL) || (plan == NULL) || (work == NULL) || (cost == NULL) ||
-        !settings_are_good(nmpc) || !problem_is_good(problem) || !plan_is_good(plan)) {
+    if ((work == NULL) || (cost == NULL) || !settings_are_good(nmpc) || !problem_is_good(problem) ||
+        !plan_is_good(plan)) {
         return PFL_ERR_ARG;
     }
     const context_t c = make_context(nmpc, problem, work);
@@ -417,8 +418,7 @@ pfl_status_t pfl_nmpc_cost(const pfl_nmpc_t *nmpc, const pfl_nmpc_problem_t *pro
 pfl_status_t pfl_nmpc_solve(const pfl_nmpc_t *nmpc, const pfl_nmpc_problem_t *problem, pfl_nmpc_plan_t *plan,
                             pfl_nmpc_work_t *work, pfl_nmpc_report_t *report)
 {
-    if ((nmpc == NULL) || (problem == NULL) || (plan == NULL) || (work == NULL) || !settings_are_good(nmpc) ||
-        !problem_is_good(problem) || !plan_is_good(plan)) {
+    if ((work == NULL) || !settings_are_good(nmpc) || !problem_is_good(problem) || !plan_is_good(plan)) {
         return PFL_ERR_ARG;
     }
     const context_t c = make_context(nmpc, problem, work);

@@ -3,7 +3,8 @@
 
 #include "rng_kernels.h"
 
-/* SplitMix64 (Steele, Lea and Flood 2014): spreads any seed over 64 bits. */
+/* SplitMix64 (Steele, Lea and Flood 2014): spreads any seed over 64 bits. Each step after the addition is invertible and
+ * maps zero to zero, so that of two successive numbers one at most is zero: no seed makes a dead stream. */
 static uint64_t splitmix64(uint64_t *state)
 {
     *state += 0x9E3779B97F4A7C15u;
@@ -37,9 +38,6 @@ void pfl_rng_seed(pfl_rng_t *rng, uint64_t seed)
     const uint64_t a = splitmix64(&mix);
     const uint64_t b = splitmix64(&mix);
     uint32_t s[4] = {(uint32_t)a, (uint32_t)(a >> 32), (uint32_t)b, (uint32_t)(b >> 32)};
-    if ((a | b) == 0u) {
-        s[0] = 1u; /* cannot happen with SplitMix64, and must not with anything else either */
-    }
     for (uint32_t lane = 0u; lane < PFL_RNG_LANES; lane++) {
         for (uint32_t k = 0u; k < 4u; k++) {
             rng->s[k][lane] = s[k];

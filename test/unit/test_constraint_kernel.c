@@ -335,3 +335,60 @@ void test_farthest_is_the_largest_distance(void)
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_farthest(f, 0u, 1u, 0.0f, 0.0f, NULL));
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_farthest(NULL, 0u, 1u, 0.0f, 0.0f, &distance));
 }
+
+/* ---- Both, in a copy and on a circle --------------------------------------------------------------------------------- */
+
+/* A fork has retry memory of its own: it draws anew there, and the original does not notice. */
+void test_a_fork_retries_in_its_own_memory(void)
+{
+    const pfl_constraint_t constraint = {inside, project, NULL, 8u, pfl_constraint_keep};
+    const pfl_config_t config = config_of(100u, &constraint);
+    pfl_t *f = fly(&config);
+    const size_t bytes = pfl_arena_bytes(&config);
+    void *arena = ut_arena(bytes);
+    pfl_t *copy = NULL;
+    pfl_health_t health;
+    pfl_view_t view;
+
+    const unsigned char *before = ut_snapshot(f);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_fork(f, arena, bytes, &copy));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_health(copy, &health));
+    const uint32_t redrawn = health.redrawn;
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_predict(copy, 2000u, NULL));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_health(copy, &health));
+    TEST_ASSERT_TRUE(health.redrawn > redrawn);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_particles(copy, &view, NULL));
+    for (uint32_t i = 0u; i < view.n; i++) {
+        TEST_ASSERT_TRUE(view.x[i] >= 0.0f);
+    }
+    TEST_ASSERT_TRUE(ut_same_bytes(before, ut_snapshot(f), pfl_snapshot_bytes(f)));
+}
+
+/* A cloud across the seam: the kernel draws each angle towards the circular mean, the short way round. */
+static void draw_at_the_seam(void *user, const pfl_batch_t *p)
+{
+    (void)user;
+    for (uint32_t i = 0u; i < p->n; i++) {
+        const float side = ((i & 1u) != 0u) ? -3.0415927f : 3.0415927f; /* 0.1 on either side of pi */
+        PFL_STATE(p, 0)[i] = side;
+    }
+}
+
+void test_kernel_goes_the_short_way_round_the_circle(void)
+{
+    const pfl_kernel_t kernel = {.width = 0.2f, .move = pfl_kernel_move};
+    pfl_config_t config = ut_dictated_config(1000u, 1u);
+    pfl_view_t view;
+
+    config.kernel = &kernel;
+    config.circular_mask = 1u;
+    config.draw = draw_at_the_seam;
+    pfl_t *f = ut_filter(&config);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_resample(f));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_particles(f, &view, NULL));
+    for (uint32_t i = 0u; i < view.n; i++) {
+        /* 0.1 from pi, moved by at most 0.2 x 0.1 x 6.67 */
+        const float off = 3.14159265f - fabsf(remainderf(view.x[i], 6.2831853f));
+        TEST_ASSERT_TRUE(off < 0.1f + 0.14f);
+    }
+}

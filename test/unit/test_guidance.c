@@ -53,6 +53,47 @@ void test_standoff_distance_is_limited_in_size_and_rate(void)
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_standoff_step(&rule, (float)NAN, 0.5f, &state));
 }
 
+/* Every condition on its own: one number wrong, the others right. */
+void test_standoff_refuses_each_bad_number_alone(void)
+{
+    const float bad[] = {0.0f, -1.0f, (float)NAN};
+    const pfl_standoff_t good = {2.0f, 30.0f, 100.0f, 5.0f};
+    pfl_standoff_state_t state = {50.0f, 1.0f, 60.0f, 3u};
+    const pfl_standoff_state_t before = state;
+
+    for (uint32_t k = 0u; k < 3u; k++) {
+        pfl_standoff_t rule[4] = {good, good, good, good};
+        rule[0].reach_gain = bad[k];
+        rule[1].min_m = bad[k];
+        rule[2].max_m = bad[k];
+        rule[3].rate_max_mps = bad[k];
+        for (uint32_t i = 0u; i < 4u; i++) {
+            TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_standoff_step(&rule[i], 40.0f, 0.5f, &state));
+        }
+    }
+    pfl_standoff_t endless = good;
+    endless.max_m = (float)INFINITY;
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_standoff_step(&endless, 40.0f, 0.5f, &state));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_standoff_step(NULL, 40.0f, 0.5f, &state));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_standoff_step(&good, 40.0f, 0.5f, NULL));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_standoff_step(&good, 40.0f, (float)INFINITY, &state));
+    TEST_ASSERT_EQUAL_MEMORY(&before, &state, sizeof state);
+    state.distance_m = (float)NAN;
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_standoff_step(&good, 40.0f, 0.5f, &state));
+}
+
+void test_standoff_counts_its_steps_and_stays_at_the_end_of_the_range(void)
+{
+    const pfl_standoff_t rule = {2.0f, 30.0f, 100.0f, 5.0f};
+    pfl_standoff_state_t state = {50.0f, 0.0f, 50.0f, UINT32_MAX - 1u};
+
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_standoff_step(&rule, 25.0f, 0.5f, &state));
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, state.steps);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_standoff_step(&rule, 25.0f, 0.5f, &state));
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, state.steps);
+    TEST_ASSERT_EQUAL_FLOAT(50.0f, state.distance_m);
+}
+
 /* ---- LVFG ------------------------------------------------------------------------------------------------------------ */
 
 void test_lvfg_gives_the_page_s_commands(void)
@@ -133,6 +174,76 @@ void test_lvfg_refuses_bad_input_and_touches_nothing(void)
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_lvfg_command(&lvfg, pair, 2u, &estimate, &standoff, command));
     TEST_ASSERT_EQUAL_FLOAT(1.0f, command[0].speed_mps);
     TEST_ASSERT_EQUAL_FLOAT(4.0f, command[1].turn_radps);
+}
+
+static pfl_status_t lvfg_with(const pfl_lvfg_t *lvfg, const pfl_uav_t *uav, const pfl_target_t *target,
+                              const pfl_standoff_state_t *rd)
+{
+    pfl_planar_uav_input_t command[2];
+
+    return pfl_lvfg_command(lvfg, uav, 2u, target, rd, command);
+}
+
+void test_lvfg_refuses_each_bad_number_alone(void)
+{
+    const pfl_lvfg_t good = {limits, 0.5f, 1.2f, false};
+    const float nan = (float)NAN;
+
+    TEST_ASSERT_EQUAL_INT(PFL_OK, lvfg_with(&good, pair, &estimate, &standoff));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, lvfg_with(&good, NULL, &estimate, &standoff));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, lvfg_with(&good, pair, NULL, &standoff));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, lvfg_with(&good, pair, &estimate, NULL));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_lvfg_command(&good, pair, 2u, &estimate, &standoff, NULL));
+    for (uint32_t i = 0u; i < 8u; i++) {
+        pfl_lvfg_t g = good;
+        float *number[] = {&g.turn_gain,
+                           &g.phase_gain,
+                           &g.limits.cruise_mps,
+                           &g.limits.speed_range_mps,
+                           &g.limits.turn_max_radps,
+                           &g.limits.speed_range_mps,
+                           &g.limits.speed_range_mps,
+                           &g.limits.turn_max_radps};
+        const float wrong[] = {nan, nan, (float)INFINITY, nan, nan, 15.0f, 0.0f, 0.0f};
+        *number[i] = wrong[i];
+        TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, lvfg_with(&g, pair, &estimate, &standoff));
+    }
+    for (uint32_t i = 0u; i < 4u; i++) {
+        pfl_target_t t = estimate;
+        float *number[] = {&t.x_m, &t.y_m, &t.vx_mps, &t.vy_mps};
+        *number[i] = nan;
+        TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, lvfg_with(&good, pair, &t, &standoff));
+    }
+    for (uint32_t i = 0u; i < 6u; i++) {
+        pfl_uav_t u[2] = {pair[0], pair[1]};
+        float *number[] = {&u[1].x_m,        &u[1].y_m,         &u[1].speed_mps,
+                           &u[1].turn_radps, &u[1].heading_rad, &u[1].heading_rad};
+        *number[i] = (i < 4u) ? nan : ((i == 4u) ? -1601.0f : 1601.0f);
+        TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, lvfg_with(&good, u, &estimate, &standoff));
+    }
+    for (uint32_t i = 0u; i < 3u; i++) {
+        pfl_standoff_state_t rd = standoff;
+        float *number[] = {&rd.distance_m, &rd.distance_m, &rd.rate_mps};
+        *number[i] = (i == 1u) ? 0.0f : nan;
+        TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, lvfg_with(&good, pair, &estimate, &rd));
+    }
+}
+
+/* Legal numbers whose commands are not finite: of the first UAV, of the second, and of the phase. */
+void test_lvfg_hands_out_nothing_that_is_not_finite(void)
+{
+    pfl_lvfg_t g = {limits, 0.5f, 1.2f, false};
+    pfl_uav_t far[2] = {pair[0], pair[1]};
+
+    far[0].x_m = 3e38f;
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_NONFINITE, lvfg_with(&g, far, &estimate, &standoff));
+    far[0] = pair[0];
+    far[1].x_m = 3e38f;
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_NONFINITE, lvfg_with(&g, far, &estimate, &standoff));
+    g.phase_gain = 3e38f;
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_NONFINITE, lvfg_with(&g, pair, &estimate, &standoff));
+    g.phase_gain = 1.2f;
+    TEST_ASSERT_EQUAL_INT(PFL_OK, lvfg_with(&g, pair, &estimate, &standoff));
 }
 
 /* ---- NMPC ------------------------------------------------------------------------------------------------------------ */
@@ -352,6 +463,136 @@ void test_nmpc_refuses_bad_input_and_touches_nothing(void)
     TEST_ASSERT_EQUAL_INT(PFL_ERR_NONFINITE, pfl_nmpc_solve(&nmpc, &problem, &plan, &work, &report));
     TEST_ASSERT_EQUAL_MEMORY(&before, &plan, sizeof plan);
     TEST_ASSERT_EQUAL_UINT32(0u, report.evaluations);
+}
+
+void test_nmpc_refuses_each_bad_setting_alone(void)
+{
+    const pfl_nmpc_plan_t plan = constant_plan(15.0f, 0.5f);
+    const pfl_nmpc_t good = page_nmpc();
+    const float nan = (float)NAN;
+    pfl_nmpc_path_t path;
+
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_rollout(&good, &pair[0], &plan, &path, NULL));
+    for (uint32_t i = 0u; i < 13u; i++) {
+        pfl_nmpc_t g = good;
+        float *number[] = {&g.limits.cruise_mps,
+                           &g.penalty,
+                           &g.turn_nominal_radps,
+                           &g.dt_s,
+                           &g.dt_s,
+                           &g.dt_s,
+                           &g.lag_share,
+                           &g.lag_share,
+                           &g.separation_m,
+                           &g.separation_m,
+                           &g.separation_m,
+                           &g.phase_weight,
+                           &g.speed_weight};
+        const float wrong[] = {nan,  (float)INFINITY, nan, nan, 0.0f, (float)INFINITY, 0.0f, 2.5f, nan,
+                               0.0f, (float)INFINITY, nan, nan};
+        *number[i] = wrong[i];
+        TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_rollout(&g, &pair[0], &plan, &path, NULL));
+    }
+    pfl_nmpc_t form = good;
+    form.phase_form = (uint32_t)PFL_PHASE_DIRECTION + 1u;
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_rollout(&form, &pair[0], &plan, &path, NULL));
+}
+
+void test_nmpc_predictions_refuse_each_bad_argument_alone(void)
+{
+    pfl_nmpc_plan_t plan = constant_plan(15.0f, 0.5f);
+    pfl_nmpc_t nmpc = page_nmpc();
+    pfl_nmpc_path_t path;
+    pfl_uav_t uav = pair[0];
+    pfl_target_t target = estimate;
+
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_rollout(NULL, &uav, &plan, &path, NULL));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_rollout(&nmpc, NULL, &plan, &path, NULL));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_rollout(&nmpc, &uav, NULL, &path, NULL));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_rollout(&nmpc, &uav, &plan, NULL, NULL));
+    uav.x_m = (float)NAN;
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_rollout(&nmpc, &uav, &plan, &path, NULL));
+    uav = pair[0];
+    plan.turn_radps[5] = (float)NAN;
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_rollout(&nmpc, &uav, &plan, &path, NULL));
+    plan = constant_plan(15.0f, 0.5f);
+    nmpc.dt_s = 5.0f;
+    uav.speed_mps = 3e38f; /* its place overflows */
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_NONFINITE, pfl_nmpc_rollout(&nmpc, &uav, &plan, &path, NULL));
+    uav = pair[0];
+    plan.turn_radps[4] = 3e38f; /* the heading at the end */
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_NONFINITE, pfl_nmpc_rollout(&nmpc, &uav, &plan, &path, NULL));
+    nmpc.dt_s = 0.5f;
+
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_extrapolate(NULL, &target, &path));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_extrapolate(&nmpc, NULL, &path));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_extrapolate(&nmpc, &target, NULL));
+    target.vy_mps = 3e38f;
+    nmpc.dt_s = 10.0f;
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_NONFINITE, pfl_nmpc_extrapolate(&nmpc, &target, &path));
+    target.vy_mps = (float)NAN;
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_extrapolate(&nmpc, &target, &path));
+    nmpc.dt_s = (float)NAN;
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_extrapolate(&nmpc, &estimate, &path));
+}
+
+void test_nmpc_cost_and_solve_refuse_each_bad_argument_alone(void)
+{
+    const pfl_nmpc_t nmpc = page_nmpc();
+    const pfl_nmpc_t unset = {0};
+    pfl_nmpc_plan_t plan = constant_plan(15.0f, 0.5f);
+    pfl_nmpc_path_t target;
+    pfl_nmpc_path_t other;
+    float cost = 7.0f;
+
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_extrapolate(&nmpc, &estimate, &target));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_rollout(&nmpc, &pair[1], &plan, &other, NULL));
+    const pfl_nmpc_problem_t good = {pair[0], &target, &other, 36.0f};
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_cost(NULL, &good, &plan, &work, &cost, NULL));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_cost(&unset, &good, &plan, &work, &cost, NULL));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_cost(&nmpc, NULL, &plan, &work, &cost, NULL));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_cost(&nmpc, &good, NULL, &work, &cost, NULL));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_cost(&nmpc, &good, &plan, &work, NULL, NULL));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_solve(&nmpc, NULL, &plan, &work, NULL));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_solve(&nmpc, &good, NULL, &work, NULL));
+    for (uint32_t i = 0u; i < 5u; i++) {
+        pfl_nmpc_problem_t p = good;
+        pfl_nmpc_path_t broken = other;
+        broken.y_m[2] = (float)NAN;
+        p.uav.y_m = (i == 0u) ? (float)NAN : p.uav.y_m;
+        p.target = (i == 1u) ? NULL : p.target;
+        p.pair = (i == 2u) ? &broken : p.pair;
+        p.distance_m = (i == 3u) ? (float)INFINITY : ((i == 4u) ? -36.0f : p.distance_m);
+        TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_cost(&nmpc, &p, &plan, &work, &cost, NULL));
+        TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_solve(&nmpc, &p, &plan, &work, NULL));
+    }
+    plan.speed_mps[1] = 1e25f; /* its square overflows */
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_NONFINITE, pfl_nmpc_cost(&nmpc, &good, &plan, &work, &cost, NULL));
+    TEST_ASSERT_EQUAL_FLOAT(7.0f, cost);
+    plan.speed_mps[1] = 15.0f;
+    pfl_nmpc_t steep =
+        nmpc; /* the cost is finite, its slope is not: a small error under a huge weight, and a long way */
+    steep.distance_weight_last = 3e38f;
+    steep.dt_s = 3.0f;
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_NONFINITE, pfl_nmpc_cost(&steep, &good, &plan, &work, &cost, NULL));
+    TEST_ASSERT_EQUAL_FLOAT(7.0f, cost);
+    plan = constant_plan(15.0f, 0.5f);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_solve(&nmpc, &good, &plan, &work, NULL)); /* a report is not wanted */
+}
+
+/* A pair on top of the target: lengths have a floor, nothing is divided by zero. */
+void test_nmpc_with_the_pair_on_the_target_is_finite(void)
+{
+    const pfl_nmpc_t nmpc = page_nmpc();
+    pfl_nmpc_plan_t plan = constant_plan(15.0f, 0.5f);
+    pfl_nmpc_plan_t gradient;
+    pfl_nmpc_path_t target;
+    float cost;
+
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_extrapolate(&nmpc, &estimate, &target));
+    const pfl_nmpc_problem_t problem = {pair[0], &target, &target, 36.0f};
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_cost(&nmpc, &problem, &plan, &work, &cost, &gradient));
+    TEST_ASSERT_TRUE(ut_finite(cost) && ut_finite(gradient.turn_radps[0]));
 }
 
 void test_nmpc_shift_repeats_the_last_commands(void)

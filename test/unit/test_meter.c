@@ -352,6 +352,23 @@ void test_a_wrapping_counter_gives_the_same_cycles_at_24_and_32_bits(void)
     }
 }
 
+/* A cycle longer than 2^32 counts reads as the longest there is. */
+void test_cycles_stay_at_the_end_of_their_range(void)
+{
+    const float z = 0.0f;
+    pfl_health_t health;
+    pfl_config_t c = ut_linear_config(N);
+    c.budget_cycles = UINT32_MAX - 1u;
+    pfl_t *f = ut_filter(&c);
+    stride = 0x7FFFFFFFu;
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_predict(f, 100000u, NULL));
+    (void)pfl_update(f, 0u, 100000u, &z);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_health(f, &health));
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, health.cycles_last);
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, health.cycles_max);
+    TEST_ASSERT_EQUAL_UINT32(1u, health.overruns);
+}
+
 void test_a_counter_that_jumps_back_counts_nothing_for_it(void)
 {
     const pfl_config_t c = budgeted(BUDGET, 1.0f);

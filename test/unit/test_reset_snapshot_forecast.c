@@ -313,6 +313,110 @@ void test_every_flipped_bit_of_a_snapshot_is_refused(void)
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_restore(f, kept, bytes));
 }
 
+/* CRC-32 of the format, written anew: what follows must be refused for its contents, not for its checksum. */
+static void seal(unsigned char *kept, size_t bytes)
+{
+    uint32_t crc = 0xFFFFFFFFu;
+    for (size_t i = 0u; i < (bytes - 4u); i++) {
+        crc ^= kept[i];
+        for (uint32_t bit = 0u; bit < 8u; bit++) {
+            crc = (crc >> 1) ^ (0xEDB88320u & (0u - (crc & 1u)));
+        }
+    }
+    for (uint32_t k = 0u; k < 4u; k++) {
+        kept[bytes - 4u + k] = (unsigned char)((~crc >> (8u * k)) & 0xFFu);
+    }
+}
+
+static uint32_t word_at(const unsigned char *kept, size_t k)
+{
+    return (uint32_t)kept[4u * k] | ((uint32_t)kept[(4u * k) + 1u] << 8) | ((uint32_t)kept[(4u * k) + 2u] << 16) |
+           ((uint32_t)kept[(4u * k) + 3u] << 24);
+}
+
+/* The answer to a snapshot with one word replaced, and its CRC right. */
+static pfl_status_t restored_with(pfl_t *f, unsigned char *kept, size_t k, uint32_t word)
+{
+    const size_t bytes = pfl_snapshot_bytes(f);
+    const uint32_t old = word_at(kept, k);
+    for (uint32_t i = 0u; i < 2u; i++) {
+        const uint32_t now = (i == 0u) ? word : old;
+        for (uint32_t b = 0u; b < 4u; b++) {
+            kept[(4u * k) + b] = (unsigned char)((now >> (8u * b)) & 0xFFu);
+        }
+        seal(kept, bytes);
+        if (i == 0u) {
+            const pfl_status_t status = pfl_restore(f, kept, bytes);
+            if (status != PFL_ERR_CORRUPT) {
+                return status;
+            }
+        }
+    }
+    return PFL_ERR_CORRUPT;
+}
+
+/* The words of a snapshot: head 0 .. 27, streams 28 .. 63, moments, states, log-weights, CRC. */
+void test_a_snapshot_that_lies_under_a_right_checksum_is_refused(void)
+{
+    enum { STREAMS = 43, MOMENTS = 79, COUNT = 5 };
+    static const struct {
+        size_t at;
+        uint32_t word;
+    } lies[] = {
+        {0, 0x73706671u},
+        {1, 1u},
+        {2, COUNT + 1u},
+        {3, 3u},
+        {4, 3u},
+        {11, 0x7F800000u},
+        {12, 0x7F800000u},
+        {12, 0u},
+        {12, 0xBF800000u},
+        {12, 0x7FC00000u},
+        {13, 0x7F800000u},
+        {14, 0x7FC00000u},
+        {14, 0x3F7FFFFFu},
+        {14, 0x40A00001u},
+        {15, 3u},
+        {16, 2u},
+        {24, 1u},
+        {27, COUNT},
+        {29, 1u},          /* sensors under watch */
+        {32, 6u},          /* no such phase */
+        {41, 0x7F800000u}, /* best log-likelihood */
+        {42, 0x7FC00000u}, /* test ratio before */
+        {MOMENTS, 0x7FC00000u},
+        {MOMENTS + 4 * 2 + 3, 0xFF800000u}, /* a state */
+    };
+    const pfl_config_t small = ut_linear_config(COUNT);
+    pfl_t *f = flown(&small, 3u);
+    const size_t bytes = pfl_snapshot_bytes(f);
+    const size_t weights = (bytes / 4u) - 1u - COUNT;
+    unsigned char *kept = ut_snapshot(f);
+    const unsigned char *before = ut_snapshot(f);
+    for (size_t k = 0u; k < (sizeof lies / sizeof lies[0]); k++) {
+        TEST_ASSERT_EQUAL_INT(PFL_ERR_CORRUPT, restored_with(f, kept, lies[k].at, lies[k].word));
+    }
+    for (size_t i = 0u; i < COUNT; i++) {
+        TEST_ASSERT_EQUAL_INT(PFL_ERR_CORRUPT, restored_with(f, kept, weights + i, 0x7FC00000u)); /* NaN */
+        TEST_ASSERT_EQUAL_INT(PFL_ERR_CORRUPT, restored_with(f, kept, weights + i, 0x7F000000u)); /* above the top */
+    }
+    TEST_ASSERT_TRUE(ut_same_bytes(before, ut_snapshot(f), bytes));
+    /* every other stream alive, one dead */
+    for (size_t lane = 0u; lane < 9u; lane++) {
+        unsigned char *dead = ut_snapshot(f);
+        for (size_t k = 0u; k < 4u; k++) {
+            const size_t at = STREAMS + ((lane < 8u) ? ((k * 8u) + lane) : (32u + k));
+            memset(&dead[4u * at], 0, 4u);
+        }
+        seal(dead, bytes);
+        TEST_ASSERT_EQUAL_INT(PFL_ERR_CORRUPT, pfl_restore(f, dead, bytes));
+    }
+    TEST_ASSERT_TRUE(ut_same_bytes(before, ut_snapshot(f), bytes));
+    TEST_ASSERT_EQUAL_INT(PFL_OK,
+                          restored_with(f, kept, weights, 0xFF800000u)); /* a particle without weight is legal */
+}
+
 void test_a_truncated_snapshot_is_refused(void)
 {
     const pfl_config_t c = ut_linear_config(5u);

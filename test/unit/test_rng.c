@@ -264,7 +264,7 @@ void test_normals_are_finite_and_bounded_with_mean_zero_and_variance_one(void)
 {
     double sum = 0.0;
     double squares = 0.0;
-    const double n = 20.0 * GROUPS * 16.0;
+    const double n = 20.0 * (double)GROUPS * 16.0;
     pfl_rng_t rng;
     pfl_rng_seed(&rng, 77u);
     for (uint32_t round = 0u; round < 20u; round++) {

@@ -256,6 +256,40 @@ void test_planar_uav_is_disturbed_as_told(void)
     TEST_ASSERT_FLOAT_WITHIN(1e-6f, -2.0f, x[PFL_UAV_TURN][0]);
 }
 
+void test_planar_uav_is_disturbed_in_one_command_alone(void)
+{
+    const pfl_planar_uav_input_t command = {15.0f, 0.0f};
+    const pfl_batch_t p = batch_of(1u);
+
+    noise[0][0] = 1.0f;
+    noise[1][0] = -1.0f;
+    for (uint32_t k = 0u; k < 2u; k++) {
+        pfl_planar_uav_t uav = {1.0f, 1u, (k == 0u) ? 2.0f : 0.0f, (k == 0u) ? 0.0f : 4.0f};
+        set(0u, 0.0f, 0.0f, 0.0f, 15.0f);
+        x[PFL_UAV_TURN][0] = 0.0f;
+        pfl_planar_uav_predict(&uav, &command, 0.25f, &p);
+        TEST_ASSERT_FLOAT_WITHIN(1e-6f, (k == 0u) ? 16.0f : 15.0f, x[PFL_UAV_SPEED][0]);
+        TEST_ASSERT_FLOAT_WITHIN(1e-6f, (k == 0u) ? 0.0f : -2.0f, x[PFL_UAV_TURN][0]);
+    }
+}
+
+/* More pieces than the most are the most: the same bits, and the time is bounded. */
+void test_planar_uav_bounds_its_pieces(void)
+{
+    const pfl_planar_uav_input_t command = {16.0f, 0.3f};
+    const pfl_batch_t p = batch_of(1u);
+    float end[2];
+
+    for (uint32_t k = 0u; k < 2u; k++) {
+        pfl_planar_uav_t uav = {0.5f, (k == 0u) ? PFL_UAV_PIECES_MAX : UINT32_MAX, 0.0f, 0.0f};
+        set(0u, 140.0f, 10.0f, 1.9f, 15.0f);
+        x[PFL_UAV_TURN][0] = 0.5f;
+        pfl_planar_uav_predict(&uav, &command, 0.5f, &p);
+        end[k] = x[PFL_UAV_X][0];
+    }
+    TEST_ASSERT_EQUAL_HEX32(ut_bits(end[0]), ut_bits(end[1]));
+}
+
 /* ---- In a filter ------------------------------------------------------------------------------------------------------ */
 
 static void draw_on_road(void *user, const pfl_batch_t *p)

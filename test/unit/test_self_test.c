@@ -5,6 +5,7 @@
 
 #include "unity.h"
 
+#include <fenv.h>
 #include <string.h>
 
 void setUp(void)
@@ -21,6 +22,20 @@ void test_the_known_answers_are_computed(void)
     void *arena = ut_arena(PFL_SELF_TEST_BYTES);
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_self_test(arena, PFL_SELF_TEST_BYTES));
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_self_test(arena, PFL_SELF_TEST_BYTES)); /* whatever was in it */
+}
+
+/* Another rounding mode, as a careless interrupt handler leaves it, gives other bits. */
+void test_a_wrong_rounding_mode_is_seen(void)
+{
+    static const int modes[] = {FE_UPWARD, FE_DOWNWARD, FE_TOWARDZERO};
+    void *arena = ut_arena(PFL_SELF_TEST_BYTES);
+    for (uint32_t k = 0u; k < 3u; k++) {
+        TEST_ASSERT_EQUAL_INT(0, fesetround(modes[k]));
+        const pfl_status_t status = pfl_self_test(arena, PFL_SELF_TEST_BYTES);
+        TEST_ASSERT_EQUAL_INT(0, fesetround(FE_TONEAREST));
+        TEST_ASSERT_EQUAL_INT(PFL_ERR_SELF_TEST, status);
+    }
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_self_test(arena, PFL_SELF_TEST_BYTES));
 }
 
 void test_it_leaves_no_filter_behind(void)

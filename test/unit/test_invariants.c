@@ -1,0 +1,135 @@
+/* pfl_invariants_hold sees every damage on its own, the random generator knows when it is dead, and counters stay at the
+ * end of their range. White box: the only tests that reach into the control block. */
+#include "support.h"
+
+#include "core.h"
+#include "rng_kernels.h"
+
+#include "unity.h"
+
+#include <string.h>
+
+#define N 21u
+
+static pfl_config_t config;
+static pfl_t *f;
+
+void setUp(void)
+{
+    config = ut_linear_config(N);
+    f = ut_filter(&config);
+    (void)ut_fly_linear(f, 100000u, 0.3f, 0u);
+    TEST_ASSERT_TRUE(pfl_invariants_hold(f));
+}
+
+void tearDown(void)
+{
+    ut_arenas_end();
+}
+
+static void seen_in_word(void *word, uint32_t damage)
+{
+    uint32_t kept;
+    memcpy(&kept, word, sizeof kept);
+    memcpy(word, &damage, sizeof damage);
+    TEST_ASSERT_FALSE(pfl_invariants_hold(f));
+    memcpy(word, &kept, sizeof kept);
+    TEST_ASSERT_TRUE(pfl_invariants_hold(f));
+}
+
+static void seen_in_float(float *number, float damage)
+{
+    seen_in_word(number, ut_bits(damage));
+}
+
+void test_damage_of_the_control_block_is_seen(void)
+{
+    seen_in_word(&f->alive, 0u);
+    seen_in_word(&f->stride, f->stride + 8u);
+    seen_in_word(&f->busy, 1u);
+    seen_in_float(&f->log_weight_top, ut_infinity());
+    seen_in_float(&f->log_weight_top, ut_nan(false));
+    seen_in_float(&f->ess, 0.5f);
+    seen_in_float(&f->ess, (float)N + 0.5f);
+    seen_in_float(&f->ess, ut_nan(false));
+}
+
+void test_damage_of_the_configuration_is_seen(void)
+{
+    const pfl_config_t *good = f->config;
+    f->config = NULL;
+    TEST_ASSERT_FALSE(pfl_invariants_hold(f));
+    f->config = good;
+    seen_in_word(&config.particles, 0u);
+}
+
+void test_damage_of_any_particle_and_weight_is_seen(void)
+{
+    for (uint32_t i = 0u; i < N; i++) {
+        seen_in_float(&f->x[i], ut_nan((i & 1u) != 0u));
+        seen_in_float(&f->x[f->stride + i], ut_infinity());
+        seen_in_float(&f->log_weight[i], ut_nan(false));
+        seen_in_float(&f->log_weight[i], f->log_weight_top + 1.0f);
+    }
+}
+
+void test_a_dead_stream_is_seen(void)
+{
+    for (uint32_t lane = 0u; lane <= PFL_RNG_LANES; lane++) {
+        const pfl_rng_t kept = f->rng;
+        for (uint32_t k = 0u; k < 4u; k++) {
+            *((lane < PFL_RNG_LANES) ? &f->rng.s[k][lane] : &f->rng.one[k]) = 0u;
+        }
+        TEST_ASSERT_FALSE(pfl_rng_alive(&f->rng));
+        TEST_ASSERT_FALSE(pfl_invariants_hold(f));
+        for (uint32_t k = 0u; k < 4u; k++) { /* one bit is life */
+            uint32_t *word = (lane < PFL_RNG_LANES) ? &f->rng.s[k][lane] : &f->rng.one[k];
+            *word = 1u << k;
+            TEST_ASSERT_TRUE(pfl_rng_alive(&f->rng));
+            *word = 0u;
+        }
+        f->rng = kept;
+        TEST_ASSERT_TRUE(pfl_rng_alive(&f->rng));
+    }
+}
+
+void test_counters_stay_at_the_end_of_their_range(void)
+{
+    uint32_t counter = UINT32_MAX - 3u;
+    pfl_count(&counter, 2u);
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX - 1u, counter);
+    pfl_count(&counter, 1u);
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, counter);
+    pfl_count(&counter, 1u);
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, counter);
+    counter = 7u;
+    pfl_count(&counter, UINT32_MAX - 6u);
+    TEST_ASSERT_EQUAL_UINT32(UINT32_MAX, counter);
+    counter = 7u;
+    pfl_count(&counter, 0u);
+    TEST_ASSERT_EQUAL_UINT32(7u, counter);
+}
+
+void test_answers_refuse_each_bad_argument_alone(void)
+{
+    float x[2];
+    pfl_view_t view;
+    pfl_health_t health;
+    pfl_t *dead = (pfl_t *)ut_arena(PFL_ARENA_BYTES(N, 2, 2));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_particles(NULL, &view, NULL));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_health(NULL, &health));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_farthest(NULL, 0u, 1u, 0.0f, 0.0f, x));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_farthest(f, 0u, 1u, 0.0f, 0.0f, NULL));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_CORRUPT, pfl_farthest(dead, 0u, 1u, 0.0f, 0.0f, x));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_farthest(f, 2u, 1u, 0.0f, 0.0f, x));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_farthest(f, 0u, 2u, 0.0f, 0.0f, x));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_farthest(f, 0u, 1u, ut_nan(false), 0.0f, x));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_farthest(f, 0u, 1u, 0.0f, ut_infinity(), x));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_farthest(f, 0u, 1u, 0.0f, 0.0f, x));
+    TEST_ASSERT_EQUAL_HEX32(0u, ut_bits(pfl_effective_sample_size(dead)));
+    TEST_ASSERT_EQUAL_UINT(0u, pfl_arena_bytes(NULL));
+    config.particles = 0u;
+    TEST_ASSERT_EQUAL_UINT(0u, pfl_arena_bytes(&config));
+    config.particles = N;
+    TEST_ASSERT_EQUAL_UINT(PFL_ARENA_BYTES(N, 2, 2), pfl_arena_bytes(&config));
+}
