@@ -20,7 +20,7 @@ typedef char pfl_sealed_part_fits[(sizeof(uint32_t[SEALED_WORDS]) <= sizeof(((st
 static uint32_t word_at(const void *bytes, size_t k)
 {
     uint32_t word;
-    PFL_COPY(&word, (const unsigned char *)bytes + (4u * k), sizeof word);
+    PFL_LOAD_WORD(word, (const void *)((const unsigned char *)bytes + (4u * k)));
     return word;
 }
 
@@ -148,7 +148,7 @@ void pfl_guard_after_batches(pfl_t *f)
 pfl_view_t pfl_guard_view(pfl_t *f, uint32_t first, uint32_t n)
 {
     pfl_view_t view = {&f->x[first], f->stride, first, n};
-    if (PFL_GUARD_CALLBACKS != 0) {
+    if (PFL_GUARD_VIEW != 0) {
         const uint32_t states = f->config->states;
         for (uint32_t d = 0u; d < states; d++) {
             pfl_lanes_copy(&f->work[(size_t)d * PFL_BATCH], &view.x[d * view.stride], (uint32_t)PFL_CEIL8(n));
@@ -162,10 +162,9 @@ pfl_view_t pfl_guard_view(pfl_t *f, uint32_t first, uint32_t n)
 float *pfl_guard_bay(pfl_t *f, uint32_t n)
 {
     float *bay = &f->work[PFL_WORK_FLOATS(f->config->states, f->config->noises) - PFL_BATCH];
-    if (PFL_GUARD_CALLBACKS != 0) {
-        for (uint32_t i = 0u; i < n; i++) {
-            pfl_store_u32(&bay[i], 0x7FC00000u);
-        }
+    if (PFL_GUARD_CANARIES != 0) {
+        pfl_store_u32(&bay[0], 0x7FC00000u);
+        pfl_store_u32(&bay[n - 1u], 0x7FC00000u);
         if (n < PFL_BATCH) {
             pfl_store_u32(&bay[n], SENTINEL);
         }
@@ -175,7 +174,7 @@ float *pfl_guard_bay(pfl_t *f, uint32_t n)
 
 bool pfl_guard_bay_is_whole(const float *bay, uint32_t n)
 {
-    return (PFL_GUARD_CALLBACKS == 0) || (n == PFL_BATCH) || (pfl_load_u32(&bay[n]) == SENTINEL);
+    return (PFL_GUARD_CANARIES == 0) || (n == PFL_BATCH) || (pfl_load_u32(&bay[n]) == SENTINEL);
 }
 
 /* ---- Canaries ------------------------------------------------------------------------------------------------- */

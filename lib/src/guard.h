@@ -4,10 +4,12 @@
  *   PFL_GUARD_CONFIG    the configuration, by a hash of its bytes, at the start of every call
  *   PFL_GUARD_CONTROL   the control block, by a sealed copy, at the start and end of every call, and the part that never
  *                       changes after each callback
- *   PFL_GUARD_CANARIES  words between the columns of the arena, at the end of every call
- *   PFL_GUARD_CALLBACKS what a log-likelihood callback sees is a copy of the particles, and what it writes a bay
+ *   PFL_GUARD_CANARIES  words between the columns of the arena, at the end of every call, and around what a
+ *                       log-likelihood callback writes
+ *   PFL_GUARD_VIEW      a log-likelihood callback sees a copy of the particles: for one that casts the const away
  *
- * All are on unless the compiler is told -DPFL_GUARD_...=0. The layout of the arena does not depend on them. */
+ * The first three are on unless the compiler is told -DPFL_GUARD_...=0, the last, which costs as much as the others
+ * together, is off unless it is told =1. The layout of the arena does not depend on them. */
 #ifndef PFL_GUARD_H
 #define PFL_GUARD_H
 
@@ -22,8 +24,8 @@
 #ifndef PFL_GUARD_CANARIES
 #define PFL_GUARD_CANARIES 1
 #endif
-#ifndef PFL_GUARD_CALLBACKS
-#define PFL_GUARD_CALLBACKS 1
+#ifndef PFL_GUARD_VIEW
+#define PFL_GUARD_VIEW 0
 #endif
 
 /* At the start of a call: PFL_OK, PFL_ERR_CONFIG, or PFL_ERR_CORRUPT when the block is beyond repair. */
@@ -43,8 +45,8 @@ void pfl_guard_start(pfl_t *f);
 void pfl_guard_after_callback(pfl_t *f);
 void pfl_guard_after_batches(pfl_t *f);
 
-/* What a log-likelihood callback may read and write: a copy of the particles, and a bay of the workspace filled with NaN,
- * so that what it leaves out does not pass for an answer. */
+/* What a log-likelihood callback may read, and write: a bay of the workspace whose first and last number are NaN, so that
+ * one who stops early, or does nothing, is found out. */
 pfl_view_t pfl_guard_view(pfl_t *f, uint32_t first, uint32_t n);
 float *pfl_guard_bay(pfl_t *f, uint32_t n);
 bool pfl_guard_bay_is_whole(const float *bay, uint32_t n); /* nothing was written behind the n-th */

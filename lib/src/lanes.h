@@ -131,7 +131,7 @@ static inline void pfl_lanes_weigh(float *restrict rows, float *restrict w, cons
     }
 }
 
-/* to = from. A copy of known length is a few moves of several registers on a small core, and no call. */
+/* to = from, without a call. */
 static inline void pfl_lanes_copy(float *restrict to, const float *restrict from, uint32_t n)
 {
     for (uint32_t groups = n / PFL_LANES; groups > 0u; groups--) {
