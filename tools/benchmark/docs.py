@@ -4,6 +4,7 @@ Checked are tables of instructions alone, which repeat with one compiler; tables
 import argparse
 
 import documents
+import guards
 import host
 import kernels
 import measure
@@ -79,7 +80,7 @@ def kernels_alone():
 
 
 TABLES = {"cycle": cycle, "scenarios": scenarios, "kernels": kernels_alone,
-          "scaling": lambda: scaling.table(quiet(scaling)), "peers": lambda: peers.table(quiet(peers))}
+          "guards": lambda: guards.table(quiet(guards)), "scaling": lambda: scaling.table(quiet(scaling)), "peers": lambda: peers.table(quiet(peers))}
 CHECKED = ["kernels"]
 
 

@@ -94,20 +94,22 @@ def plugin():
     return build_once("plugin", make)
 
 
-def player(machine, optimise):
+def player(machine, optimise, defines=()):
+    """The image that plays a tape; `defines` (-D...) are for the library and make it a build of its own."""
     def make():
         if machine.emulator:
             need(machine.emulator[0])
             need(machine.prefix + "gcc")
         folder = BUILD / (f"{machine.name}-{optimise}" if machine.toolchain else machine.name)
+        folder = folder.with_name(folder.name + re.sub(r"[^A-Z0-9]+", "", "".join(defines)))
         arguments = ["-DPFLIGHT_BUILD_TOOLS=OFF", "-DPFLIGHT_BUILD_IMAGES=ON", "-DPFLIGHT_WERROR=ON", *machine.cmake]
         if machine.toolchain:
             arguments.append(f"-DCMAKE_TOOLCHAIN_FILE=tools/targets/toolchain/{machine.name}.cmake")
-            arguments += ["-DCMAKE_BUILD_TYPE=Release"] if optimise == "O3" else [
-                "-DCMAKE_BUILD_TYPE=None", f"-DCMAKE_C_FLAGS_NONE=-{optimise}"]
+            arguments += ["-DCMAKE_BUILD_TYPE=Release"] if optimise == "O3" and not defines else [
+                "-DCMAKE_BUILD_TYPE=None", f"-DCMAKE_C_FLAGS_NONE={' '.join([f'-{optimise}', *defines])}"]
         configure_and_build(folder, "pflight_replay", arguments)
         return folder / "tools/targets/pflight_replay"
-    return build_once((machine.name, optimise), make)
+    return build_once((machine.name, optimise, tuple(defines)), make)
 
 
 # ---- The tape ------------------------------------------------------------------------------------------------------------
@@ -275,7 +277,7 @@ def fly(scenario, machine, options, counted=True):
     command, said = record(scenario, options, folder)
     if not (folder / "host.in").exists():
         raise Failure(f"{scenario} makes no call to the library with these settings: choose a particle filter, --filter", 2)
-    image = player(machine, options.optimise)
+    image = player(machine, options.optimise, getattr(options, "defines", ()))
     write_tape(folder / "host.in", folder / "tape.in", options)
     line = play(machine, image, folder)
     ours, host = (folder / "tape.out").read_bytes(), (folder / "host.out").read_bytes()
