@@ -392,3 +392,46 @@ void test_kernel_goes_the_short_way_round_the_circle(void)
         TEST_ASSERT_TRUE(off < 0.1f + 0.14f);
     }
 }
+
+/* The kernel's scratch moments of a copy are its own: the red zones and the original tell. */
+void test_a_fork_moves_its_kernel_in_its_own_memory(void)
+{
+    const pfl_kernel_t kernel = {0.5f, 0u};
+    pfl_config_t config;
+    pfl_t *f = kernel_filter(&kernel, &config);
+    const size_t bytes = pfl_arena_bytes(&config);
+    unsigned char *arena = (unsigned char *)ut_arena(bytes);
+    const unsigned char *before = ut_snapshot(f);
+    pfl_t *copy = NULL;
+    pfl_view_t view;
+    pfl_view_t moved;
+
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_fork(f, arena, bytes, &copy));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_resample(copy));
+    TEST_ASSERT_TRUE(ut_red_zones_intact());
+    TEST_ASSERT_TRUE(ut_same_bytes(before, ut_snapshot(f), pfl_snapshot_bytes(f)));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_particles(f, &view, NULL));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_particles(copy, &moved, NULL));
+    TEST_ASSERT_TRUE(fabsf(view.x[0] - moved.x[0]) > 0.0f);
+    TEST_ASSERT_TRUE(pfl_invariants_hold(copy));
+}
+
+void test_a_restored_filter_has_the_counters_of_its_constraint(void)
+{
+    const pfl_constraint_t constraint = {inside, project, NULL, 2u};
+    const pfl_config_t config = config_of(100u, &constraint);
+    pfl_t *f = fly(&config);
+    pfl_t *other = fly(&config);
+    pfl_health_t kept;
+    pfl_health_t now;
+
+    for (uint32_t k = 2u; k < 5u; k++) {
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_predict(f, 1000u * k, NULL));
+    }
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_health(f, &kept));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_restore(other, ut_snapshot(f), pfl_snapshot_bytes(f)));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_health(other, &now));
+    TEST_ASSERT_TRUE((kept.redrawn > 50u) && (kept.projected > 25u));
+    TEST_ASSERT_EQUAL_UINT32(kept.redrawn, now.redrawn);
+    TEST_ASSERT_EQUAL_UINT32(kept.projected, now.projected);
+}

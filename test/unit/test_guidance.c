@@ -229,6 +229,27 @@ void test_lvfg_refuses_each_bad_number_alone(void)
     }
 }
 
+/* The second UAV is ahead of the first by less than half an orbit, by more, or just behind: who is faster, and by how much. */
+void test_lvfg_keeps_the_phase_whatever_the_gap(void)
+{
+    static const double gaps[] = {0.5, 3.0, 3.3, 6.0, -0.5};
+    const pfl_lvfg_t lvfg = {limits, 0.5f, 0.01f, false};
+    const pfl_target_t target = {0.0f, 0.0f, 0.0f, 0.0f};
+    const pfl_standoff_state_t close = {0.5f, 0.0f, 0.5f, 1u}; /* below a metre is legal too */
+    pfl_planar_uav_input_t command[2];
+
+    for (uint32_t k = 0u; k < 5u; k++) {
+        const double gap = gaps[k] < 0.0 ? gaps[k] + 2.0 * 3.14159265358979 : gaps[k];
+        const pfl_uav_t uav[2] = {{50.0f, 0.0f, 1.6f, 15.0f, 0.3f},
+                                  {(float)(50.0 * cos(gaps[k])), (float)(50.0 * sin(gaps[k])), 1.6f, 15.0f, 0.3f}};
+        const double faster = 0.01 * (gap - 3.14159265358979) * 36.0;
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_lvfg_command(&lvfg, uav, 2u, &target, &standoff, command));
+        TEST_ASSERT_FLOAT_WITHIN(1e-5f, (float)(15.0 + faster), command[0].speed_mps);
+        TEST_ASSERT_FLOAT_WITHIN(1e-5f, (float)(15.0 - faster), command[1].speed_mps);
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_lvfg_command(&lvfg, uav, 2u, &target, &close, command));
+    }
+}
+
 /* Legal numbers whose commands are not finite: of the first UAV, of the second, and of the phase. */
 void test_lvfg_hands_out_nothing_that_is_not_finite(void)
 {

@@ -133,3 +133,19 @@ void test_answers_refuse_each_bad_argument_alone(void)
     config.particles = N;
     TEST_ASSERT_EQUAL_UINT(PFL_ARENA_BYTES(N, 2, 2), pfl_arena_bytes(&config));
 }
+
+/* Every column of a copy lies where the original's lies, in the copy's own arena. */
+void test_a_fork_points_into_its_own_arena(void)
+{
+    const size_t bytes = pfl_arena_bytes(&config);
+    pfl_t *copy = NULL;
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_fork(f, ut_arena(bytes), bytes, &copy));
+    const float *const from[] = {f->mean,       f->best,  f->centre, f->delta, f->cov,        f->kernel_mean,
+                                 f->kernel_cov, f->lanes, f->work,   f->x,     f->log_weight, f->scratch};
+    const float *const to[] = {copy->mean, copy->best,        copy->centre,     copy->delta,
+                               copy->cov,  copy->kernel_mean, copy->kernel_cov, copy->lanes,
+                               copy->work, copy->x,           copy->log_weight, copy->scratch};
+    for (size_t k = 0u; k < (sizeof from / sizeof from[0]); k++) {
+        TEST_ASSERT_EQUAL_INT64((const char *)from[k] - (const char *)f, (const char *)to[k] - (const char *)copy);
+    }
+}

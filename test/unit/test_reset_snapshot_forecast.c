@@ -461,6 +461,10 @@ void test_a_snapshot_needs_its_room(void)
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_snapshot(NULL, buffer, bytes));
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_snapshot(f, buffer, bytes));
     TEST_ASSERT_EQUAL_UINT(0u, pfl_snapshot_bytes(NULL));
+    unsigned char *roomy = (unsigned char *)ut_arena(bytes + 24u); /* a larger buffer will do, both ways */
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_snapshot(f, roomy, bytes + 24u));
+    TEST_ASSERT_TRUE(ut_same_bytes(buffer, roomy, bytes));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_restore(f, roomy, bytes + 24u));
 }
 
 void test_a_snapshot_is_little_endian_and_versioned(void)
