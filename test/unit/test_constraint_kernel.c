@@ -396,7 +396,7 @@ void test_kernel_goes_the_short_way_round_the_circle(void)
 /* The kernel's scratch moments of a copy are its own: the red zones and the original tell. */
 void test_a_fork_moves_its_kernel_in_its_own_memory(void)
 {
-    const pfl_kernel_t kernel = {0.5f, 0u};
+    const pfl_kernel_t kernel = {.width = 0.5f, .states_mask = 0u, .move = pfl_kernel_move};
     pfl_config_t config;
     pfl_t *f = kernel_filter(&kernel, &config);
     const size_t bytes = pfl_arena_bytes(&config);
@@ -418,7 +418,7 @@ void test_a_fork_moves_its_kernel_in_its_own_memory(void)
 
 void test_a_restored_filter_has_the_counters_of_its_constraint(void)
 {
-    const pfl_constraint_t constraint = {inside, project, NULL, 2u};
+    const pfl_constraint_t constraint = {inside, project, NULL, 2u, pfl_constraint_keep};
     const pfl_config_t config = config_of(100u, &constraint);
     pfl_t *f = fly(&config);
     pfl_t *other = fly(&config);
