@@ -12,6 +12,7 @@
 #define SENTINEL 0x3F8CAFE5u /* a float near 1.1: harmless where sums run over the padding */
 
 #define SEALED_WORDS (offsetof(struct pfl, seal) / 4u)
+#define SEALED_LONG_WORDS (offsetof(struct pfl, seal) / sizeof(uintptr_t))
 #define CONSTANT_WORDS (offsetof(struct pfl, reset_t_us) / 4u)
 #define LOOP_WORDS (offsetof(struct pfl, mean) / sizeof(uintptr_t))
 
@@ -29,6 +30,20 @@ static uint32_t hash_words(uint32_t hash, const void *bytes, size_t words)
 {
     for (size_t k = 0u; k < words; k++) {
         hash = pfl_rotl((hash ^ word_at(bytes, k)) * 0x9E3779B1u, 13u);
+    }
+    return hash;
+}
+
+/* The same of the control block, by words as long as the machine's. */
+static uintptr_t hash_block(const void *block)
+{
+    const unsigned char *at = (const unsigned char *)block;
+    uintptr_t hash = 1u;
+    for (size_t k = 0u; k < SEALED_LONG_WORDS; k++) {
+        uintptr_t word;
+        PFL_COPY(&word, &at[k * sizeof word], sizeof word);
+        hash = (hash ^ word) * (uintptr_t)0x9E3779B97F4A7C15u;
+        hash = (hash << 13) | (hash >> ((8u * sizeof hash) - 13u));
     }
     return hash;
 }
@@ -76,7 +91,7 @@ static bool config_is_intact(const pfl_t *f)
 static void seal(pfl_t *f)
 {
     if (PFL_GUARD_CONTROL != 0) {
-        f->seal = hash_words(1u, f, SEALED_WORDS);
+        f->seal = hash_block(f);
         PFL_COPY(f->copy, f, 4u * SEALED_WORDS);
     }
     f->open = 0u;
@@ -84,18 +99,26 @@ static void seal(pfl_t *f)
 
 typedef enum { INTACT, MENDABLE, LOST } damage_t;
 
-static damage_t look_at_block(const pfl_t *f)
+static bool copy_differs(const pfl_t *f, size_t words)
 {
-    if ((PFL_GUARD_CONTROL == 0) || (f->open == OPEN) || (hash_words(1u, f, SEALED_WORDS) == f->seal)) {
-        return (f->alive == PFL_ALIVE) ? INTACT : LOST;
+    uint32_t different = 0u;
+    for (size_t k = 0u; k < words; k++) {
+        different |= word_at(f, k) ^ word_at(f->copy, k);
     }
-    const uint32_t block = hash_words(1u, f, SEALED_WORDS);
-    const uint32_t copy = hash_words(1u, f->copy, SEALED_WORDS);
-    const bool alive = word_at(f->copy, 0u) == PFL_ALIVE; /* memory of zeros agrees with itself, too */
-    return (alive && ((copy == f->seal) || (copy == block))) ? MENDABLE : LOST;
+    return different != 0u;
 }
 
-/* The copy is right, or it equals the block: then the seal was wrong, and is made anew at the end of the call. */
+/* A block that equals its copy is right whatever the seal says, which is made anew at the end of the call; except that
+ * memory of zeros agrees with itself, too. */
+static damage_t look_at_block(const pfl_t *f)
+{
+    if ((PFL_GUARD_CONTROL == 0) || (f->open == OPEN) || !copy_differs(f, SEALED_WORDS) || (hash_block(f) == f->seal)) {
+        return (f->alive == PFL_ALIVE) ? INTACT : LOST;
+    }
+    const bool alive = word_at(f->copy, 0u) == PFL_ALIVE;
+    return (alive && (hash_block(f->copy) == f->seal)) ? MENDABLE : LOST;
+}
+
 static void mend_block(pfl_t *f)
 {
     PFL_COPY(f, f->copy, 4u * SEALED_WORDS);
@@ -107,7 +130,7 @@ static void mend_block(pfl_t *f)
 /* During a call the seal is that of the copy. */
 static void mend_constants(pfl_t *f)
 {
-    if (hash_words(1u, f->copy, SEALED_WORDS) == f->seal) {
+    if (hash_block(f->copy) == f->seal) {
         PFL_COPY(f, f->copy, 4u * CONSTANT_WORDS);
         f->watched.fault |= PFL_FAULT_CONTROL;
         f->watched.event |= PFL_EVENT_MENDED;
@@ -134,11 +157,7 @@ void pfl_guard_after_callback(pfl_t *f)
 
 void pfl_guard_after_batches(pfl_t *f)
 {
-    uint32_t different = 0u;
-    for (size_t k = 0u; (PFL_GUARD_CONTROL != 0) && (k < CONSTANT_WORDS); k++) {
-        different |= word_at(f, k) ^ word_at(f->copy, k);
-    }
-    if (different != 0u) {
+    if ((PFL_GUARD_CONTROL != 0) && copy_differs(f, CONSTANT_WORDS)) {
         mend_constants(f);
     }
 }

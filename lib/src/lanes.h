@@ -23,19 +23,25 @@ static inline float pfl_lane_sum(const float *row)
     return ((row[0] + row[1]) + (row[2] + row[3])) + ((row[4] + row[5]) + (row[6] + row[7]));
 }
 
-/* row += x + y, in any order */
-static inline void pfl_lanes_sum(float *restrict row, const float *restrict x, const float *restrict y, uint32_t n)
+/* row += the elements of the columns at x, x + near, x + far and x + near + far, in any order */
+static inline void pfl_lanes_sum(float *restrict row, const float *restrict x, size_t near, size_t far, uint32_t n)
 {
     pfl_part_t *sum = (pfl_part_t *)row;
-    const pfl_part_t *value = (const pfl_part_t *)x;
-    const pfl_part_t *other = (const pfl_part_t *)y;
+    const pfl_part_t *a = (const pfl_part_t *)x;
+    const pfl_part_t *b = (const pfl_part_t *)(x + near);
+    const pfl_part_t *c = (const pfl_part_t *)(x + far);
+    const pfl_part_t *d = (const pfl_part_t *)(x + near + far);
     for (uint32_t groups = n / PFL_LANES; groups > 0u; groups--) {
         for (uint32_t k = 0u; k < PFL_LANE_PARTS; k++) {
-            sum[k] += value[k];
-            sum[k] += other[k];
+            sum[k] += a[k];
+            sum[k] += b[k];
+            sum[k] += c[k];
+            sum[k] += d[k];
         }
-        value += PFL_LANE_PARTS;
-        other += PFL_LANE_PARTS;
+        a += PFL_LANE_PARTS;
+        b += PFL_LANE_PARTS;
+        c += PFL_LANE_PARTS;
+        d += PFL_LANE_PARTS;
     }
 }
 
@@ -43,13 +49,13 @@ static inline void pfl_lanes_sum(float *restrict row, const float *restrict x, c
 static inline void pfl_lanes_product(float *restrict row, const float *restrict w, const float *restrict x,
                                      const float *centre, uint32_t n)
 {
-    const float c = centre[0];
+    const float minus_c = -centre[0]; /* x86 subtracts from a register only, but adds from memory */
     pfl_part_t *sum = (pfl_part_t *)row;
     const pfl_part_t *weight = (const pfl_part_t *)w;
     const pfl_part_t *value = (const pfl_part_t *)x;
     for (uint32_t groups = n / PFL_LANES; groups > 0u; groups--) {
         for (uint32_t k = 0u; k < PFL_LANE_PARTS; k++) {
-            sum[k] += weight[k] * (value[k] - c);
+            sum[k] += weight[k] * (value[k] + minus_c);
         }
         weight += PFL_LANE_PARTS;
         value += PFL_LANE_PARTS;
@@ -61,8 +67,8 @@ static inline void pfl_lanes_product(float *restrict row, const float *restrict 
 static inline void pfl_lanes_products(float *restrict rows, const float *restrict w, const float *restrict x,
                                       uint32_t stride, const float *centres, uint32_t n)
 {
-    const float c = centres[0];
-    const float d = centres[1];
+    const float minus_c = -centres[0];
+    const float minus_d = -centres[1];
     pfl_part_t *sum = (pfl_part_t *)rows;
     const pfl_part_t *weight = (const pfl_part_t *)w;
     const pfl_part_t *value = (const pfl_part_t *)x;
@@ -70,8 +76,8 @@ static inline void pfl_lanes_products(float *restrict rows, const float *restric
     for (uint32_t groups = n / PFL_LANES; groups > 0u; groups--) {
         for (uint32_t k = 0u; k < PFL_LANE_PARTS; k++) {
             const pfl_part_t part = weight[k];
-            sum[k] += part * (value[k] - c);
-            sum[PFL_LANE_PARTS + k] += part * (other[k] - d);
+            sum[k] += part * (value[k] + minus_c);
+            sum[PFL_LANE_PARTS + k] += part * (other[k] + minus_d);
         }
         weight += PFL_LANE_PARTS;
         value += PFL_LANE_PARTS;

@@ -25,8 +25,9 @@ static inline float pfl_exp_kernel(float x)
 {
     const float top = 88.72283905f;
     const float bottom = -87.33654475f;
-    const float high = (x > top) ? top : x; /* both keep a NaN */
-    const float c = (high < bottom) ? bottom : high;
+    const int32_t above = -(int32_t)(x > top); /* neither for a NaN, which goes through */
+    const int32_t below = -(int32_t)(x < bottom);
+    const float c = pfl_select(below, bottom, pfl_select(above, top, x));
     const float biased = (c * 1.44269504f) + PFL_ROUND_MAGIC;
     const float kf = biased - PFL_ROUND_MAGIC;
     const int32_t k = pfl_bits(biased) - pfl_bits(PFL_ROUND_MAGIC);
@@ -39,8 +40,7 @@ static inline float pfl_exp_kernel(float x)
     const float e = ((p * (r * r)) + r) + 1.0f;
     const int32_t half = k >> 1; /* 2^128 is out of a float's reach: two factors, both exact */
     const float y = (e * pfl_pow2i(half)) * pfl_pow2i(k - half);
-    const float low = (x < bottom) ? 0.0f : y;
-    return (x > top) ? pfl_from_bits(0x7F800000) : low;
+    return pfl_select(above, pfl_from_bits(0x7F800000), pfl_from_bits(pfl_bits(y) & ~below));
 }
 
 /* log(m 2^e) for positive normal m 2^e, no special cases. */

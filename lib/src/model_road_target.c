@@ -35,9 +35,10 @@ void pfl_road_target_predict(void *user, const void *u, float dt_s, const pfl_ba
         const float dx = x[i] - m.center_x_m;
         const float dy = y[i] - m.center_y_m;
         const float r = pfl_sqrt_kernel((dx * dx) + (dy * dy));
-        const bool nowhere = r < NO_RADIUS;
-        const float nx = nowhere ? 1.0f : (dx / r);
-        const float ny = nowhere ? 0.0f : (dy / r);
+        const int32_t nowhere = -(int32_t)(r < NO_RADIUS);
+        const float length = pfl_select(nowhere, 1.0f, r);
+        const float nx = pfl_select(nowhere, 1.0f, dx / length);
+        const float ny = pfl_select(nowhere, 0.0f, dy / length);
         const float out = (vx[i] * nx) + (vy[i] * ny);
         const float on = (vy[i] * nx) - (vx[i] * ny);
         const float kick_out = across * w_across[i];
@@ -45,8 +46,9 @@ void pfl_road_target_predict(void *user, const void *u, float dt_s, const pfl_ba
         const float free = r + ((dt_s * out) + (half * kick_out));
         const float radius = clip(free, m.inner_m, m.outer_m);
         const float faster = out + kick_out;
-        const bool leaving = ((free > m.outer_m) & (faster > 0.0f)) | ((free < m.inner_m) & (faster < 0.0f));
-        const float out_speed = leaving ? 0.0f : faster;
+        const int32_t leaving_out = -(int32_t)(free > m.outer_m) & -(int32_t)(faster > 0.0f);
+        const int32_t leaving_in = -(int32_t)(free < m.inner_m) & -(int32_t)(faster < 0.0f);
+        const float out_speed = pfl_select(leaving_out | leaving_in, 0.0f, faster);
         const float on_speed = on + kick_on;
         pfl_sincos_kernel(((dt_s * on) + (half * kick_on)) / radius, &s, &c);
         const float ex = (nx * c) - (ny * s);

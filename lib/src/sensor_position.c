@@ -2,9 +2,15 @@
  * particle's sum in a register. */
 #include "pflight/sensors.h"
 
-static inline float half_square(float x, float z, float inv_sigma)
+/* What a squared distance counts for. */
+static inline float factor(const pfl_position_t *s, uint32_t k)
 {
-    const float e = (x - z) * inv_sigma;
+    return -0.5f * (s->inv_sigma[k] * s->inv_sigma[k]);
+}
+
+static inline float square(float x, float z)
+{
+    const float e = x - z;
     return e * e;
 }
 
@@ -17,9 +23,9 @@ static void one(const pfl_position_t *s, const float *z, const pfl_view_t *p, fl
 {
     const float *restrict a = column(s, p, 0u);
     const float za = z[0];
-    const float ia = s->inv_sigma[0];
+    const float fa = factor(s, 0u);
     for (uint32_t i = 0u; i < p->n; i++) {
-        ll[i] = -0.5f * half_square(a[i], za, ia);
+        ll[i] = square(a[i], za) * fa;
     }
 }
 
@@ -29,10 +35,10 @@ static void two(const pfl_position_t *s, const float *z, const pfl_view_t *p, fl
     const float *restrict b = column(s, p, 1u);
     const float za = z[0];
     const float zb = z[1];
-    const float ia = s->inv_sigma[0];
-    const float ib = s->inv_sigma[1];
+    const float fa = factor(s, 0u);
+    const float fb = factor(s, 1u);
     for (uint32_t i = 0u; i < p->n; i++) {
-        ll[i] = -0.5f * (half_square(a[i], za, ia) + half_square(b[i], zb, ib));
+        ll[i] = (square(a[i], za) * fa) + (square(b[i], zb) * fb);
     }
 }
 
@@ -44,12 +50,12 @@ static void three(const pfl_position_t *s, const float *z, const pfl_view_t *p, 
     const float za = z[0];
     const float zb = z[1];
     const float zc = z[2];
-    const float ia = s->inv_sigma[0];
-    const float ib = s->inv_sigma[1];
-    const float ic = s->inv_sigma[2];
+    const float fa = factor(s, 0u);
+    const float fb = factor(s, 1u);
+    const float fc = factor(s, 2u);
     for (uint32_t i = 0u; i < p->n; i++) {
-        const float ab = half_square(a[i], za, ia) + half_square(b[i], zb, ib);
-        ll[i] = -0.5f * (ab + half_square(c[i], zc, ic));
+        const float ab = (square(a[i], za) * fa) + (square(b[i], zb) * fb);
+        ll[i] = ab + (square(c[i], zc) * fc);
     }
 }
 
@@ -66,7 +72,7 @@ void pfl_position_loglik(void *user, const void *z, const pfl_view_t *p, float *
         for (uint32_t k = 3u; k < s->count; k++) {
             const float *restrict a = column(s, p, k);
             for (uint32_t i = 0u; i < p->n; i++) {
-                ll[i] -= 0.5f * half_square(a[i], measured[k], s->inv_sigma[k]);
+                ll[i] += square(a[i], measured[k]) * factor(s, k);
             }
         }
     }

@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define N 70u
+#define N 140u
 
 static float ll[300];
 static uint32_t faults;

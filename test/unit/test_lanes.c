@@ -17,7 +17,7 @@ static const lanes_form_t *const forms[] = {&lanes_scalar, &lanes_four, &lanes_e
 
 static float w[N_MAX];
 static float s[N_MAX];
-static float x[2u * N_MAX];
+static float x[4u * N_MAX];
 static uint64_t dice;
 
 void setUp(void)
@@ -27,7 +27,7 @@ void setUp(void)
         s[i] = (ut_uniform(&dice) < 0.1) ? -ut_infinity() : (float)(-3.0 - (60.0 * pow(ut_uniform(&dice), 3.0)));
         w[i] = (float)ut_uniform(&dice);
     }
-    for (uint32_t i = 0u; i < (2u * N_MAX); i++) {
+    for (uint32_t i = 0u; i < (4u * N_MAX); i++) {
         x[i] = (float)(1000.0 + ut_gaussian(&dice));
     }
 }
@@ -139,12 +139,12 @@ void test_the_sum_shows_any_value_that_is_not_finite(void)
 {
     const float bad[] = {ut_nan(false), ut_nan(true), ut_infinity(), -ut_infinity()};
     for (size_t k = 0u; k < FORMS; k++) {
-        for (uint32_t at = 0u; at < (2u * N_MAX); at++) {
+        for (uint32_t at = 0u; at < (4u * N_MAX); at++) {
             float row[LANES] = {0.0f};
             float all = 0.0f;
             const float kept = x[at];
             x[at] = bad[at % 4u];
-            forms[k]->sum(row, x, &x[N_MAX], N_MAX);
+            forms[k]->sum(row, x, N_MAX, 2u * N_MAX, N_MAX);
             x[at] = kept;
             for (uint32_t l = 0u; l < LANES; l++) {
                 all += row[l];
@@ -152,7 +152,7 @@ void test_the_sum_shows_any_value_that_is_not_finite(void)
             TEST_ASSERT_FALSE(ut_finite(all));
         }
         float row[LANES] = {0.0f};
-        forms[k]->sum(row, x, &x[N_MAX], N_MAX);
+        forms[k]->sum(row, x, N_MAX, 2u * N_MAX, N_MAX);
         TEST_ASSERT_TRUE(ut_finite(row[0]));
     }
 }

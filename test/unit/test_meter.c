@@ -7,7 +7,7 @@
 #include <stdio.h>
 #include <string.h>
 
-#define N 200u /* four batches */
+#define N 400u /* four batches */
 #define BUDGET 1000u
 
 /* The counter: moves by `stride` at each read, and by `jump` more at read number `jump_at`. */

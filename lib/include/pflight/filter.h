@@ -24,7 +24,7 @@ extern "C" {
 #endif
 
 #define PFL_ABI 0x70660002u          /* write it into pfl_config_t.abi */
-#define PFL_BATCH 64u                /* particles in one callback, at most */
+#define PFL_BATCH 128u               /* particles in one callback, at most */
 #define PFL_PARTICLES_MAX 1048576u   /* N */
 #define PFL_STATES_MAX 16u           /* D */
 #define PFL_NOISES_MAX 16u           /* Q */
