@@ -101,11 +101,9 @@ void pfl_reinject(pfl_t *f, uint32_t sensor, const void *z)
 
 pfl_status_t pfl_last_reset(const pfl_t *f, uint32_t *count, uint64_t *t_us, float *delta)
 {
-    if (f == NULL) {
-        return PFL_ERR_ARG;
-    }
-    if (!pfl_is_alive(f)) {
-        return PFL_ERR_CORRUPT;
+    const pfl_status_t looked = pfl_look(f);
+    if (looked != PFL_OK) {
+        return looked;
     }
     if (count != NULL) {
         *count = f->resets;

@@ -140,7 +140,7 @@ static unsigned char *put_tracks(const pfl_t *f, unsigned char *at)
 
 size_t pfl_snapshot_bytes(const pfl_t *f)
 {
-    return ((f != NULL) && pfl_is_alive(f)) ? (4u * total_words(f)) : 0u;
+    return (pfl_look(f) == PFL_OK) ? (4u * total_words(f)) : 0u;
 }
 
 pfl_status_t pfl_snapshot(const pfl_t *f, void *buffer, size_t buffer_bytes)
