@@ -190,12 +190,12 @@ static bool parts_are_legal(const pfl_config_t *c)
         legal = c->lo[d] < c->hi[d];
     }
     if (c->constraint != NULL) {
-        legal = legal && c->constraint->inside != NULL && c->constraint->project != NULL && c->constraint->keep != NULL &&
-                c->constraint->tries >= 1u && c->constraint->tries <= PFL_TRIES_MAX;
+        legal = legal && c->constraint->inside != NULL && c->constraint->project != NULL &&
+                c->constraint->keep != NULL && c->constraint->tries >= 1u && c->constraint->tries <= PFL_TRIES_MAX;
     }
     if (c->kernel != NULL) {
-        legal = legal && c->kernel->move != NULL && c->moments == PFL_MOMENTS_FULL && c->kernel->width > 0.0f && c->kernel->width < 1.0f &&
-                ((uint64_t)c->kernel->states_mask < ((uint64_t)1u << c->states));
+        legal = legal && c->kernel->move != NULL && c->moments == PFL_MOMENTS_FULL && c->kernel->width > 0.0f &&
+                c->kernel->width < 1.0f && ((uint64_t)c->kernel->states_mask < ((uint64_t)1u << c->states));
     }
     return legal;
 }
