@@ -329,7 +329,7 @@ static pfl_status_t restore(pfl_t *f, const void *buffer, size_t buffer_bytes)
     for (size_t d = 0u; d < states; d++) {
         at = get_floats(at, &f->x[d * f->stride], f->config->particles);
     }
-    f->weights_equal = 0u;
+    pfl_weights_settle(f); /* the padding of the column, too */
     (void)get_floats(at, f->log_weight, f->config->particles);
     return PFL_OK;
 }
