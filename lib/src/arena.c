@@ -121,21 +121,15 @@ pfl_status_t pfl_lay_out(void *arena, size_t arena_bytes, const pfl_config_t *c,
     return PFL_OK;
 }
 
-bool pfl_is_alive(const pfl_t *f)
+pfl_status_t pfl_look(const pfl_t *f)
 {
-    return f->alive == PFL_ALIVE;
+    return (f != NULL) ? pfl_guard_look(f) : PFL_ERR_ARG;
 }
 
 pfl_status_t pfl_enter(const pfl_t *f)
 {
-    if (f == NULL) {
-        return PFL_ERR_ARG;
-    }
-    const pfl_status_t intact = pfl_guard_look(f);
-    if (intact != PFL_OK) {
-        return intact;
-    }
-    return (f->busy != 0u) ? PFL_ERR_BUSY : PFL_OK;
+    const pfl_status_t looked = pfl_look(f);
+    return ((looked == PFL_OK) && (f->busy != 0u)) ? PFL_ERR_BUSY : looked;
 }
 
 pfl_status_t pfl_begin(pfl_t *f)

@@ -121,8 +121,8 @@ static inline uint32_t pfl_padded(const pfl_t *f)
 /* arena.c */
 bool pfl_config_is_good(const pfl_config_t *c);
 pfl_status_t pfl_lay_out(void *arena, size_t arena_bytes, const pfl_config_t *c, pfl_t **out);
-bool pfl_is_alive(const pfl_t *f);
-pfl_status_t pfl_enter(const pfl_t *f); /* PFL_OK, or why a call that only reads f cannot start */
+pfl_status_t pfl_look(const pfl_t *f);  /* PFL_OK, or why nothing in f may be followed */
+pfl_status_t pfl_enter(const pfl_t *f); /* the same for a call that only reads f, but not from within a callback */
 pfl_status_t pfl_begin(pfl_t *f);       /* the same for a call that changes f: it ends with pfl_end */
 pfl_status_t pfl_end(pfl_t *f, pfl_status_t status);
 pfl_status_t pfl_fault(pfl_t *f, pfl_status_t status); /* counts a fault, tells the port, returns the status */

@@ -4,15 +4,9 @@
 #include "rng_kernels.h"
 #include "sqrt_kernel.h"
 
-static pfl_status_t copy_moments(const pfl_t *f, float *mean, float *cov)
+static void copy_moments(const pfl_t *f, float *mean, float *cov)
 {
     const uint32_t states = f->config->states;
-    if (mean == NULL) {
-        return PFL_ERR_ARG;
-    }
-    if ((cov != NULL) && (f->config->moments != (uint16_t)PFL_MOMENTS_FULL)) {
-        return PFL_ERR_CONFIG;
-    }
     memcpy(mean, f->mean, sizeof(float) * states);
     const float *upper = f->cov;
     for (uint32_t d = 0u; (cov != NULL) && (d < states); d++) {
@@ -22,19 +16,28 @@ static pfl_status_t copy_moments(const pfl_t *f, float *mean, float *cov)
             upper++;
         }
     }
-    return PFL_OK;
 }
 
 static pfl_status_t estimate(pfl_t *f, float *mean, float *cov)
 {
+    if (mean == NULL) {
+        return PFL_ERR_ARG;
+    }
+    if ((cov != NULL) && (f->config->moments != (uint16_t)PFL_MOMENTS_FULL)) {
+        return PFL_ERR_CONFIG;
+    }
     pfl_refresh(f);
-    return (f->moments_current == MOMENTS_OVERFLOWED) ? pfl_fault(f, PFL_ERR_NONFINITE) : copy_moments(f, mean, cov);
+    if (f->moments_current == MOMENTS_OVERFLOWED) {
+        return pfl_fault(f, PFL_ERR_NONFINITE);
+    }
+    copy_moments(f, mean, cov);
+    return PFL_OK;
 }
 
 pfl_status_t pfl_estimate(pfl_t *f, float *mean, float *cov)
 {
     if ((pfl_enter(f) == PFL_OK) && (f->moments_current == MOMENTS_CURRENT)) {
-        return copy_moments(f, mean, cov); /* nothing changes, so nothing needs a new seal */
+        return estimate(f, mean, cov); /* nothing changes, so nothing needs a new seal */
     }
     const pfl_status_t entered = pfl_begin(f);
     return (entered == PFL_OK) ? pfl_end(f, estimate(f, mean, cov)) : entered;
@@ -42,11 +45,9 @@ pfl_status_t pfl_estimate(pfl_t *f, float *mean, float *cov)
 
 pfl_status_t pfl_most_likely(const pfl_t *f, float *state)
 {
-    if ((f == NULL) || (state == NULL)) {
-        return PFL_ERR_ARG;
-    }
-    if (!pfl_is_alive(f)) {
-        return PFL_ERR_CORRUPT;
+    const pfl_status_t looked = (state != NULL) ? pfl_look(f) : PFL_ERR_ARG;
+    if (looked != PFL_OK) {
+        return looked;
     }
     memcpy(state, f->best, sizeof(float) * f->config->states);
     return PFL_OK;
@@ -54,16 +55,14 @@ pfl_status_t pfl_most_likely(const pfl_t *f, float *state)
 
 float pfl_effective_sample_size(const pfl_t *f)
 {
-    return ((f != NULL) && pfl_is_alive(f)) ? f->ess : 0.0f;
+    return (pfl_look(f) == PFL_OK) ? f->ess : 0.0f;
 }
 
 pfl_status_t pfl_particles(const pfl_t *f, pfl_view_t *view, float *log_weights)
 {
-    if ((f == NULL) || (view == NULL)) {
-        return PFL_ERR_ARG;
-    }
-    if (!pfl_is_alive(f)) {
-        return PFL_ERR_CORRUPT;
+    const pfl_status_t looked = (view != NULL) ? pfl_look(f) : PFL_ERR_ARG;
+    if (looked != PFL_OK) {
+        return looked;
     }
     const pfl_view_t all = {f->x, f->stride, 0u, f->config->particles};
     *view = all;
@@ -75,11 +74,9 @@ pfl_status_t pfl_particles(const pfl_t *f, pfl_view_t *view, float *log_weights)
 
 pfl_status_t pfl_farthest(const pfl_t *f, uint16_t x_state, uint16_t y_state, float x, float y, float *distance)
 {
-    if ((f == NULL) || (distance == NULL)) {
-        return PFL_ERR_ARG;
-    }
-    if (!pfl_is_alive(f)) {
-        return PFL_ERR_CORRUPT;
+    const pfl_status_t looked = (distance != NULL) ? pfl_look(f) : PFL_ERR_ARG;
+    if (looked != PFL_OK) {
+        return looked;
     }
     if ((x_state >= f->config->states) || (y_state >= f->config->states) || !pfl_is_finite(x) || !pfl_is_finite(y)) {
         return PFL_ERR_ARG;
@@ -160,7 +157,7 @@ pfl_status_t pfl_quantile(pfl_t *f, uint16_t state, float p, float *value)
 
 bool pfl_invariants_hold(const pfl_t *f)
 {
-    if ((f == NULL) || !pfl_is_alive(f) || (f->config == NULL) || !pfl_config_is_good(f->config)) {
+    if ((pfl_look(f) != PFL_OK) || !pfl_config_is_good(f->config)) {
         return false;
     }
     const uint32_t count = f->config->particles;

@@ -155,6 +155,14 @@ void pfl_guard_after_callback(pfl_t *f)
     }
 }
 
+void pfl_guard_take_over(pfl_t *f)
+{
+    if (PFL_GUARD_CONTROL != 0) {
+        PFL_COPY(f->copy, f, 4u * CONSTANT_WORDS);
+        f->seal = hash_words(1u, f->copy, SEALED_WORDS);
+    }
+}
+
 void pfl_guard_after_batches(pfl_t *f)
 {
     if ((PFL_GUARD_CONTROL != 0) && copy_differs(f, CONSTANT_WORDS)) {

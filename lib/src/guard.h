@@ -45,6 +45,9 @@ void pfl_guard_start(pfl_t *f);
 void pfl_guard_after_callback(pfl_t *f);
 void pfl_guard_after_batches(pfl_t *f);
 
+/* The library itself has changed that, by a resampling in the midst of a call, whose columns change places. */
+void pfl_guard_take_over(pfl_t *f);
+
 /* What a log-likelihood callback may read, and write: a bay of the workspace whose first and last number are NaN, so that
  * one who stops early, or does nothing, is found out. */
 pfl_view_t pfl_guard_view(pfl_t *f, uint32_t first, uint32_t n);

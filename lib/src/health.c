@@ -20,20 +20,20 @@ float pfl_worst_ratio(const pfl_t *f)
 
 pfl_status_t pfl_health(const pfl_t *f, pfl_health_t *out)
 {
-    if ((f == NULL) || (out == NULL)) {
-        return PFL_ERR_ARG;
-    }
-    if (!pfl_is_alive(f)) {
-        return PFL_ERR_CORRUPT;
+    const pfl_status_t looked = (out != NULL) ? pfl_look(f) : PFL_ERR_ARG;
+    const bool known =
+        looked == PFL_OK; /* how many sensors there are; the rest is told whatever the configuration is */
+    if (!known && (looked != PFL_ERR_CONFIG)) {
+        return looked;
     }
     memset(out, 0, sizeof *out);
     out->t_us = f->t_us;
     out->t_fused_us = f->t_fused_us;
     out->ess = f->ess;
-    out->test_ratio = pfl_worst_ratio(f);
+    out->test_ratio = known ? pfl_worst_ratio(f) : f->test_ratio;
     out->best_loglik = f->watched.best_loglik;
     out->phase = (pfl_phase_t)f->watched.phase;
-    out->fault = f->watched.fault;
+    out->fault = f->watched.fault | (known ? 0u : PFL_FAULT_CONFIG);
     out->reject = f->watched.reject;
     out->mode = mode_of(f);
     out->event = f->watched.event;

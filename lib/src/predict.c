@@ -176,6 +176,7 @@ PFL_NOINLINE static pfl_status_t catch_up(pfl_t *f, const void *u, float dt_s)
     (void)pfl_moments(f, false);
     if (pfl_resample_is_due(f)) {
         pfl_resample_now(f);
+        pfl_guard_take_over(f);
     }
     f->resample_pending = 0u;
     return PFL_OK;

@@ -82,6 +82,7 @@ void pfl_reinject(pfl_t *f, uint32_t sensor, const void *z)
     memcpy(f->delta, f->mean, sizeof(float) * f->config->states);
     pfl_weights(f);
     pfl_resample_now(f);
+    pfl_guard_take_over(f);
     for (uint32_t first = count - drawn; first < count; first += PFL_BATCH) {
         const uint32_t n = ((count - first) < PFL_BATCH) ? (count - first) : PFL_BATCH;
         const pfl_batch_t batch = pfl_batch_at(f, first, n);
@@ -100,11 +101,9 @@ void pfl_reinject(pfl_t *f, uint32_t sensor, const void *z)
 
 pfl_status_t pfl_last_reset(const pfl_t *f, uint32_t *count, uint64_t *t_us, float *delta)
 {
-    if (f == NULL) {
-        return PFL_ERR_ARG;
-    }
-    if (!pfl_is_alive(f)) {
-        return PFL_ERR_CORRUPT;
+    const pfl_status_t looked = pfl_look(f);
+    if (looked != PFL_OK) {
+        return looked;
     }
     if (count != NULL) {
         *count = f->resets;

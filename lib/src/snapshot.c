@@ -140,7 +140,7 @@ static unsigned char *put_tracks(const pfl_t *f, unsigned char *at)
 
 size_t pfl_snapshot_bytes(const pfl_t *f)
 {
-    return ((f != NULL) && pfl_is_alive(f)) ? (4u * total_words(f)) : 0u;
+    return (pfl_look(f) == PFL_OK) ? (4u * total_words(f)) : 0u;
 }
 
 pfl_status_t pfl_snapshot(const pfl_t *f, void *buffer, size_t buffer_bytes)
@@ -329,7 +329,7 @@ static pfl_status_t restore(pfl_t *f, const void *buffer, size_t buffer_bytes)
     for (size_t d = 0u; d < states; d++) {
         at = get_floats(at, &f->x[d * f->stride], f->config->particles);
     }
-    f->weights_equal = 0u;
+    pfl_weights_settle(f); /* the padding of the column, too */
     (void)get_floats(at, f->log_weight, f->config->particles);
     return PFL_OK;
 }

@@ -16,6 +16,8 @@ typedef struct {
     pfl_sensor_t sensor[PFL_SENSORS_MAX + 1u];
     pfl_constraint_t constraint;
     pfl_kernel_t kernel;
+    pfl_watch_t watch;
+    float ok_sigma[PFL_STATES_MAX];
     float lo[PFL_STATES_MAX], hi[PFL_STATES_MAX];
 } setup_t;
 
@@ -65,6 +67,14 @@ static void project(void *user, const pfl_batch_t *p)
     }
 }
 
+static void redraw(void *user, const void *z, const pfl_batch_t *p)
+{
+    draw(user, p);
+    for (uint32_t i = 0u; i < p->n; i++) {
+        p->x[i] = *(const float *)z;
+    }
+}
+
 /* ---- Configurations -------------------------------------------------------------------------------------------------- */
 
 /* A field: mostly one that is legal, so that not every configuration fails at the first. */
@@ -91,12 +101,41 @@ static void choose_parts(stream_t *in, setup_t *s)
         s->constraint.inside = ((parts & 0x70u) == 0x70u) ? NULL : inside;
         s->constraint.project = ((parts & 0x70u) == 0x60u) ? NULL : project;
         s->constraint.tries = field(in, 4u);
+        s->constraint.keep = ((parts & 0x70u) == 0x50u) ? NULL : pfl_constraint_keep;
         c->constraint = &s->constraint;
     }
     if ((parts & 128u) != 0u) {
         s->kernel.width = ((parts & 64u) != 0u) ? 0.5f : take_float(in);
         s->kernel.states_mask = field(in, 7u);
+        s->kernel.move = ((parts & 0x30u) == 0x30u) ? NULL : pfl_kernel_move;
         c->kernel = &s->kernel;
+    }
+}
+
+static void choose_watch(stream_t *in, setup_t *s)
+{
+    pfl_watch_t *w = &s->watch;
+    const uint8_t parts = take_u8(in);
+    if ((parts & 1u) == 0u) {
+        return;
+    }
+    for (uint32_t d = 0u; d < PFL_STATES_MAX; d++) {
+        s->ok_sigma[d] = ((parts & 2u) != 0u) ? 2.0f : take_float(in);
+    }
+    w->ok_sigma = ((parts & 4u) != 0u) ? s->ok_sigma : NULL;
+    w->confirm_us = take_u16(in);
+    w->lost_us = take_u32(in);
+    w->lost_rejects = take_u8(in) & 3u;
+    w->settle_updates = take_u16(in);
+    w->lean_ratio = ((parts & 8u) != 0u) ? take_float(in) : 0.0f;
+    w->reinject = ((parts & 16u) != 0u) ? take_float(in) : 0.3f;
+    w->keep = ((parts & 0xE0u) == 0xE0u) ? NULL : pfl_watch_keep;
+    s->config.watch = w;
+    for (uint32_t k = 0u; k <= PFL_SENSORS_MAX; k++) {
+        s->sensor[k].redraw = ((parts & 32u) != 0u) ? redraw : NULL;
+        s->sensor[k].timeout_us = ((parts & 64u) != 0u) ? take_u8(in) * 1000u : 0u;
+        s->sensor[k].z_bytes = ((parts & 128u) != 0u) ? sizeof(float) : 0u;
+        s->sensor[k].frozen_after = (uint16_t)(k & 3u);
     }
 }
 
@@ -123,6 +162,7 @@ static void choose(stream_t *in, setup_t *s)
         s->sensor[k].gate = ((odd & 4u) != 0u) ? take_float(in) : 0.0f;
     }
     choose_parts(in, s);
+    choose_watch(in, s);
     c->sensors = ((odd & 0x1Fu) == 3u) ? NULL : s->sensor;
     c->predict = ((odd & 0x1Fu) == 4u) ? NULL : predict;
     c->draw = ((odd & 8u) != 0u) ? NULL : draw;
@@ -151,18 +191,32 @@ static bool parts_are_legal(const pfl_config_t *c)
     }
     if (c->constraint != NULL) {
         legal = legal && c->constraint->inside != NULL && c->constraint->project != NULL &&
-                c->constraint->tries >= 1u && c->constraint->tries <= PFL_TRIES_MAX;
+                c->constraint->keep != NULL && c->constraint->tries >= 1u && c->constraint->tries <= PFL_TRIES_MAX;
     }
     if (c->kernel != NULL) {
-        legal = legal && c->moments == PFL_MOMENTS_FULL && c->kernel->width > 0.0f && c->kernel->width < 1.0f &&
-                ((uint64_t)c->kernel->states_mask < ((uint64_t)1u << c->states));
+        legal = legal && c->kernel->move != NULL && c->moments == PFL_MOMENTS_FULL && c->kernel->width > 0.0f &&
+                c->kernel->width < 1.0f && ((uint64_t)c->kernel->states_mask < ((uint64_t)1u << c->states));
+    }
+    return legal;
+}
+
+static bool watch_is_legal(const pfl_config_t *c)
+{
+    const pfl_watch_t *w = c->watch;
+    bool legal = true;
+    if (w != NULL) {
+        legal = w->keep != NULL && w->lean_ratio >= 0.0f && w->lean_ratio <= 1.0f && w->reinject >= 0.0f &&
+                w->reinject <= 1.0f && (w->ok_sigma == NULL || c->moments == PFL_MOMENTS_FULL);
+        for (uint32_t d = 0u; legal && w->ok_sigma != NULL && d < c->states; d++) {
+            legal = w->ok_sigma[d] > 0.0f;
+        }
     }
     return legal;
 }
 
 static bool is_legal(const pfl_config_t *c)
 {
-    return numbers_are_legal(c) && parts_are_legal(c);
+    return numbers_are_legal(c) && parts_are_legal(c) && watch_is_legal(c);
 }
 
 /* ---- A filter that works ------------------------------------------------------------------------------------------------- */
@@ -178,7 +232,8 @@ static void check_cycle(pfl_t *f, const pfl_config_t *c, uint64_t t_us)
     for (uint16_t k = 0u; (moved == PFL_OK) && (k <= c->sensor_count); k++) {
         const pfl_status_t fused = pfl_update(f, k, t_us, &z);
         const bool late = (fused == PFL_DEFERRED) || (fused == PFL_ERR_BUDGET);
-        const bool gated = (k < c->sensor_count) && (c->sensors[k].gate > 0.0f);
+        const bool known = (c->watch != NULL) && (k < c->sensor_count) && (c->sensors[k].z_bytes > 0u);
+        const bool gated = (k < c->sensor_count) && ((c->sensors[k].gate > 0.0f) || known);
         REQUIRE((fused == PFL_ERR_SENSOR) == (k == c->sensor_count));
         REQUIRE((fused == PFL_OK) || (fused == PFL_ERR_SENSOR) || (late && (c->budget_cycles > 0u)) ||
                 ((fused == PFL_REJECTED) && gated));

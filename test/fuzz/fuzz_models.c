@@ -350,6 +350,7 @@ static void nmpc(case_t *c)
     pfl_nmpc_plan_t plan, gradient;
     pfl_nmpc_report_t report = {NAN, 0u};
     pfl_nmpc_problem_t problem;
+    pfl_nmpc_work_t work;
     float cost = NAN;
     numbers(c, &g, sizeof g);
     limits(c, &g.limits);
@@ -363,12 +364,12 @@ static void nmpc(case_t *c)
     problem.pair = ((take_u8(&c->in) & 1u) != 0u) ? &pair : NULL;
     problem.distance_m = number(c);
     const pfl_nmpc_plan_t before = plan;
-    pfl_status_t status = pfl_nmpc_cost(&g, &problem, &plan, &cost, &gradient);
+    pfl_status_t status = pfl_nmpc_cost(&g, &problem, &plan, &work, &cost, &gradient);
     REQUIRE((status == PFL_OK) ? (isfinite(cost) && plan_is_finite(&gradient)) : isnan(cost));
     if ((take_u8(&c->in) & 3u) != 0u) {
         return; /* a solution takes a hundred times as long */
     }
-    status = pfl_nmpc_solve(&g, &problem, &plan, &report);
+    status = pfl_nmpc_solve(&g, &problem, &plan, &work, &report);
     REQUIRE((status == PFL_OK) ? (isfinite(report.cost) && plan_is_finite(&plan))
                                : (memcmp(&before, &plan, sizeof plan) == 0));
     REQUIRE(report.evaluations <= PFL_NMPC_EVALUATIONS_MAX);

@@ -59,13 +59,16 @@ static void loglik(void *user, const void *z, const pfl_view_t *p, float *ll)
     }
 }
 
-static const pfl_sensor_t sensor = {loglik, NULL, 0.0f};
-static const pfl_kernel_t kernel = {0.3f, 0u};
+static const pfl_sensor_t sensor = {.loglik = loglik, .timeout_us = 100000u, .z_bytes = sizeof(float)};
+static const pfl_kernel_t kernel = {.width = 0.3f, .move = pfl_kernel_move};
+static const float ok_sigma[STATES_MAX] = {1.0f, 1.0f, INFINITY, 2.0f};
+static const pfl_watch_t watch = {.ok_sigma = ok_sigma, .reinject = 0.3f, .lost_rejects = 1u, .keep = pfl_watch_keep};
 
 static void make_shape(shape_t *s, uint32_t k)
 {
     static const uint8_t particles[SHAPES] = {1u, 2u, 3u, 5u, 8u, 9u, 17u, PARTICLES_MAX};
     const float z = 0.3f;
+    const float news = 0.2f; /* the same once more would be refused by a watch */
     s->config = (pfl_config_t){.abi = PFL_ABI,
                                .particles = particles[k],
                                .states = (uint16_t)(1u + (k % STATES_MAX)),
@@ -78,6 +81,7 @@ static void make_shape(shape_t *s, uint32_t k)
                                .seed = k % 4u,
                                .sensors = &sensor,
                                .kernel = (k == 6u) ? &kernel : NULL,
+                               .watch = ((k & 1u) != 0u) ? &watch : NULL,
                                .predict = predict,
                                .draw = draw,
                                .user = &s->config};
@@ -97,7 +101,7 @@ static void make_shape(shape_t *s, uint32_t k)
         REQUIRE((phase < 3u) || (pfl_reset(s->f, 300000u) == PFL_OK));
         REQUIRE(pfl_snapshot(s->f, s->kept[phase], s->kept_bytes) == PFL_OK);
     }
-    REQUIRE(pfl_update(s->f, 0u, 300000u, &z) == PFL_OK);
+    REQUIRE(pfl_update(s->f, 0u, 300000u, &news) == PFL_OK);
     memcpy(s->pristine, s->arena, s->bytes);
 }
 
