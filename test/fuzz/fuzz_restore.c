@@ -60,10 +60,11 @@ static void loglik(void *user, const void *z, const pfl_view_t *p, float *ll)
 }
 
 static const pfl_sensor_t sensor = {loglik, NULL, 0.0f};
-static const pfl_kernel_t kernel = {0.3f, 0u};
+static const pfl_kernel_t kernel = {.width = 0.3f, .move = pfl_kernel_move};
 
 static void make_shape(shape_t *s, uint32_t k)
 {
+    static const pfl_scheme_fn schemes[] = {pfl_systematic, pfl_stratified, pfl_residual, pfl_multinomial};
     static const uint8_t particles[SHAPES] = {1u, 2u, 3u, 5u, 8u, 9u, 17u, PARTICLES_MAX};
     const float z = 0.3f;
     s->config = (pfl_config_t){.abi = PFL_ABI,
@@ -71,9 +72,10 @@ static void make_shape(shape_t *s, uint32_t k)
                                .states = (uint16_t)(1u + (k % STATES_MAX)),
                                .noises = (uint16_t)(k % 3u),
                                .sensor_count = 1u,
-                               .resampling = (uint16_t)(k % 4u),
+                               .resampling = schemes[k % 4u],
                                .moments = (k == 2u) ? PFL_MOMENTS_MEAN : PFL_MOMENTS_FULL,
                                .circular_mask = k & 1u,
+                               .circular = pfl_circular_means,
                                .ess_ratio = (k == 4u) ? 0.0f : 0.6f,
                                .seed = k % 4u,
                                .sensors = &sensor,
