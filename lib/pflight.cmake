@@ -23,7 +23,9 @@ set(PFLIGHT_LIB_SOURCES
   kernel.c
   weights.c
   resample.c
+  resample_schemes.c
   moments.c
+  circles.c
   estimate.c
   reset.c
   snapshot.c

@@ -64,11 +64,11 @@ bool pfl_config_is_good(const pfl_config_t *c)
 {
     const bool sizes = (c->particles >= 1u) && (c->particles <= PFL_PARTICLES_MAX) && (c->states >= 1u) &&
                        (c->states <= PFL_STATES_MAX) && (c->noises <= PFL_NOISES_MAX);
-    if (!sizes || (c->predict == NULL) || (c->reserved != 0u)) {
+    if (!sizes || (c->predict == NULL)) {
         return false;
     }
-    const bool choices = (c->resampling <= (uint16_t)PFL_RESAMPLE_MULTINOMIAL) &&
-                         (c->moments <= (uint16_t)PFL_MOMENTS_MEAN) && ((c->circular_mask >> c->states) == 0u);
+    const bool choices = (c->moments <= (uint16_t)PFL_MOMENTS_MEAN) && ((c->circular_mask >> c->states) == 0u) &&
+                         ((c->circular_mask == 0u) || (c->circular != NULL));
     const bool ratio = pfl_is_finite(c->ess_ratio) && (c->ess_ratio >= 0.0f) && (c->ess_ratio <= 1.0f);
     return choices && ratio && sensors_are_good(c) && box_is_good(c) && options_are_good(c);
 }

@@ -26,7 +26,7 @@ static uint32_t word_at(const void *bytes, size_t k)
 }
 
 /* One to one in each word, so that no change of a single word stays unseen. */
-static uint32_t hash_words(uint32_t hash, const void *bytes, size_t words)
+PFL_NOINLINE static uint32_t hash_words(uint32_t hash, const void *bytes, size_t words)
 {
     for (size_t k = 0u; k < words; k++) {
         hash = pfl_rotl((hash ^ word_at(bytes, k)) * 0x9E3779B1u, 13u);
@@ -88,7 +88,7 @@ static bool config_is_intact(const pfl_t *f)
 
 /* ---- Control block -------------------------------------------------------------------------------------------- */
 
-static void seal(pfl_t *f)
+PFL_NOINLINE static void seal(pfl_t *f)
 {
     if (PFL_GUARD_CONTROL != 0) {
         f->seal = hash_block(f);
@@ -234,7 +234,7 @@ static bool canaries_are_alive(const pfl_t *f)
     return different == 0u;
 }
 
-static void set_canaries(const pfl_t *f)
+PFL_NOINLINE static void set_canaries(const pfl_t *f)
 {
     for (uint32_t k = 0u; k < canaries_of(f); k++) {
         pfl_store_u32(canary_at(f, k), SENTINEL);

@@ -3,36 +3,13 @@
  * Deviations are taken from the most likely particle, which lies inside the cloud, so one sweep loses nothing to
  * cancellation; those of angles from their circular mean, which takes a sweep of its own. lanes.h tells how the sums
  * are formed. */
-#include "core.h"
-
-#include "lanes.h"
-
-#include "pflight/math.h"
-
-/* Rows of f->lanes, eight partial sums each: w and w^2; w dev of each state; w sin dev and w cos dev of each state
- * (angles only); then the upper triangle of w dev_d dev_e. */
-#define ROW_WEIGHT 0u
-#define ROW_SQUARE 1u
-#define ROW_MEAN 2u
-#define ROW_CIRCLE(states) (ROW_MEAN + (states))
-#define ROW_PRODUCT(states) (ROW_MEAN + (3u * (states)))
-#define ROW_END(states) (ROW_PRODUCT(states) + (((states) * ((states) + 1u)) / 2u))
+#include "moments.h"
 
 #define LONG_PIECE (4u * PFL_BATCH) /* particles; a few columns of as many fit into a first-level cache */
 
-static float *row_at(const pfl_t *f, uint32_t row)
-{
-    return f->lanes + ((size_t)row * PFL_LANES);
-}
-
 PFL_NOINLINE static float row_sum(const pfl_t *f, uint32_t row)
 {
-    return pfl_lane_sum(row_at(f, row));
-}
-
-static bool is_circular(const pfl_t *f, uint32_t d)
-{
-    return ((f->config->circular_mask >> d) & 1u) != 0u;
+    return pfl_lane_sum(pfl_row_at(f, row));
 }
 
 static bool is_full(const pfl_t *f)
@@ -44,7 +21,7 @@ static bool is_full(const pfl_t *f)
 
 PFL_NOINLINE static void weigh_lanes(pfl_t *f, uint32_t first, uint32_t n)
 {
-    pfl_lanes_weigh(row_at(f, ROW_WEIGHT), &f->scratch[first], &f->log_weight[first], f->log_weight_top, n);
+    pfl_lanes_weigh(pfl_row_at(f, ROW_WEIGHT), &f->scratch[first], &f->log_weight[first], f->log_weight_top, n);
 }
 
 /* Neighbouring columns, and what is to be taken off each. */
@@ -60,7 +37,7 @@ static const float no_centre[PFL_STATES_MAX];
 /* As many rows, from `row` on, grow by w (x - centre). */
 PFL_NOINLINE static void product_lanes(const pfl_t *f, uint32_t row, const float *w, const columns_t *of, uint32_t n)
 {
-    float *rows = row_at(f, row);
+    float *rows = pfl_row_at(f, row);
     const float *x = of->x;
     const float *centre = of->centre;
     uint32_t left = of->count;
@@ -75,49 +52,13 @@ PFL_NOINLINE static void product_lanes(const pfl_t *f, uint32_t row, const float
     }
 }
 
-/* Sine and cosine of angles about a centre into the first two work columns. */
-PFL_NOINLINE static void circle(float *restrict work, const float *restrict x, float centre, uint32_t n)
-{
-    for (uint32_t i = 0u; i < n; i++) {
-        pfl_sincos_kernel(pfl_wrap_pi_kernel(x[i] - centre), &work[i], &work[PFL_BATCH + i]);
-    }
-}
-
-/* Sums of sine and cosine of the angles, about the most likely particle. */
-PFL_NOINLINE static void circle_lanes(pfl_t *f, uint32_t first, uint32_t n)
-{
-    const uint32_t states = f->config->states;
-    const columns_t of = {f->work, PFL_BATCH, 2u, no_centre};
-    for (uint32_t d = 0u; d < states; d++) {
-        if (is_circular(f, d)) {
-            circle(f->work, &f->x[((size_t)d * f->stride) + first], f->centre[d], n);
-            product_lanes(f, ROW_CIRCLE(states) + (2u * d), &f->scratch[first], &of, n);
-        }
-    }
-}
-
-/* The circular means become the centres of the angles. */
-PFL_NOINLINE static void centre_circles(const pfl_t *f)
-{
-    const uint32_t states = f->config->states;
-    for (uint32_t d = 0u; d < states; d++) {
-        if (is_circular(f, d)) {
-            const uint32_t row = ROW_CIRCLE(states) + (2u * d);
-            const float turn = pfl_atan2_kernel(row_sum(f, row), row_sum(f, row + 1u));
-            const float near_pi = pfl_wrap_pi_kernel(f->centre[d] + turn); /* to 4e-4, after many turns */
-            const float mean = pfl_wrap_pi_kernel(near_pi);
-            f->centre[d] = ((mean >= PFL_PI) || (mean < -PFL_PI)) ? -PFL_PI : mean;
-        }
-    }
-}
-
 /* Only the means, and those of the angles are known: the sums of every run of other states. */
 static void mean_lanes(const pfl_t *f, uint32_t first, uint32_t n)
 {
     const uint32_t states = f->config->states;
     for (uint32_t d = 0u; d < states; d++) {
         uint32_t end = d;
-        while ((end < states) && !is_circular(f, end)) {
+        while ((end < states) && !pfl_is_circular(f, end)) {
             end++;
         }
         const columns_t of = {&f->x[((size_t)d * f->stride) + first], f->stride, end - d, &f->centre[d]};
@@ -131,7 +72,7 @@ static void deviations(pfl_t *f, uint32_t d, const float *restrict x, uint32_t n
 {
     float *restrict dev = &f->work[(size_t)d * PFL_BATCH];
     const float centre = f->centre[d];
-    if (is_circular(f, d)) {
+    if (pfl_is_circular(f, d)) {
         for (uint32_t i = 0u; i < n; i++) {
             dev[i] = pfl_wrap_pi_kernel(x[i] - centre);
         }
@@ -182,7 +123,7 @@ PFL_NOINLINE static void finish(const pfl_t *f, float *mean, float *cov)
     float shift[PFL_STATES_MAX];
     for (uint32_t d = 0u; d < states; d++) {
         shift[d] = row_sum(f, ROW_MEAN + d) / sum;
-        mean[d] = is_circular(f, d) ? f->centre[d] : (f->centre[d] + shift[d]);
+        mean[d] = pfl_is_circular(f, d) ? f->centre[d] : (f->centre[d] + shift[d]);
     }
     if (is_full(f)) {
         const uint32_t rows = ROW_PRODUCT(states);
@@ -242,7 +183,7 @@ static bool sweep(pfl_t *f, bool budgeted, uint32_t passes)
             weigh_lanes(f, first, n);
         }
         if ((passes & PASS_CIRCLES) != 0u) {
-            circle_lanes(f, first, n);
+            f->config->circular(f, first, n);
         }
         if ((passes & PASS_STATES) != 0u) {
             state_lanes(f, first, n);
@@ -279,7 +220,7 @@ static bool sum_up(pfl_t *f, bool budgeted)
     if (!sweep(f, budgeted, PASS_WEIGHTS | PASS_CIRCLES)) {
         return false;
     }
-    centre_circles(f);
+    f->config->circular(f, 0u, 0u);
     return sweep(f, budgeted, PASS_STATES);
 }
 

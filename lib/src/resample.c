@@ -14,20 +14,14 @@
  * rounding is left to be clamped. A particle without weight does not move c and gets nothing. The mean of below(c) over
  * the 2^F equally likely V is h(c) / 2^F, which is c N / S to within 2^-F: with F = 29 - floor(log2 N) every expected
  * count is right to 2^-28 N, 1e-6 of an offspring at N = 300. */
-#include "core.h"
+#include "resample.h"
 
 #include "rng_kernels.h"
 
 #define QUANTA 2.0e9f
 #define LANES 8u
 
-typedef struct {
-    uint32_t factor; /* M */
-    uint32_t shift;  /* F */
-} comb_t;
-
-/* 0 < count <= 2^20, 2^30 < total < 2^31. */
-PFL_NOINLINE static comb_t comb_of(uint32_t count, uint32_t total)
+PFL_NOINLINE comb_t pfl_comb_of(uint32_t count, uint32_t total)
 {
     uint32_t shift = 29u;
     while ((count >> (30u - shift)) != 0u) {
@@ -45,12 +39,6 @@ PFL_NOINLINE static comb_t comb_of(uint32_t count, uint32_t total)
     }
     comb_t comb = {factor + ((rest > 0u) ? 1u : 0u), shift};
     return comb;
-}
-
-/* h(c) */
-static inline uint32_t height(uint32_t factor, uint32_t c)
-{
-    return (uint32_t)(((uint64_t)c * factor) >> 32);
 }
 
 /* Loops over eight lanes at a moving address, a step at a time: so gcc makes vectors of them, and as well as anything of
@@ -85,7 +73,14 @@ static uint32_t total_of(const uint32_t *sums)
     return ((sums[0] + sums[1]) + (sums[2] + sums[3])) + ((sums[4] + sums[5]) + (sums[6] + sums[7]));
 }
 
-/* ---- Schemes: integer weights to offspring counts, both in the scratch column ---------------------------------------- */
+uint32_t pfl_quantise(pfl_t *f)
+{
+    uint32_t sums[LANES];
+    quantise(f, sums);
+    return total_of(sums);
+}
+
+/* ---- Integer weights to offspring counts, both in the scratch column -------------------------------------------------- */
 
 /* The order of the particles on the comb is free. It is by lanes: first those with i mod 8 = 0, then 1, and so on. A
  * vector runs through all lanes at once, each from where the one before ends; without vectors one lane after the other
@@ -149,125 +144,12 @@ static void comb_lanes(pfl_t *f, const comb_t *comb, const uint32_t *sums, uint3
 }
 #endif
 
-PFL_NOINLINE static void count_systematic(pfl_t *f)
+void pfl_systematic(pfl_t *f)
 {
     uint32_t sums[LANES];
     quantise(f, sums);
-    const comb_t comb = comb_of(f->config->particles, total_of(sums));
+    const comb_t comb = pfl_comb_of(f->config->particles, total_of(sums));
     comb_lanes(f, &comb, sums, pfl_xoshiro_next(f->rng.one) >> (32u - comb.shift));
-}
-
-/* The same with a V of its own for the point of each stratum k <= c N / S < k + 1. */
-PFL_NOINLINE static void count_stratified(pfl_t *f)
-{
-    const uint32_t count = f->config->particles;
-    uint32_t sums[LANES];
-    quantise(f, sums);
-    const comb_t comb = comb_of(count, total_of(sums));
-    uint32_t reach = 0u;
-    uint32_t before = 0u;
-    uint32_t drawn = 0u; /* strata whose V is known: those below `drawn` */
-    uint32_t start = 0u;
-    for (uint32_t i = 0u; i < count; i++) {
-        reach += pfl_load_u32(&f->scratch[i]);
-        const uint32_t high = height(comb.factor, reach);
-        while ((drawn <= (high >> comb.shift)) && (drawn < count)) {
-            start = pfl_xoshiro_next(f->rng.one) >> (32u - comb.shift);
-            drawn++;
-        }
-        const uint32_t below = (high + start) >> comb.shift;
-        pfl_store_u32(&f->scratch[i], below - before);
-        before = below;
-    }
-}
-
-/* Two schemes draw particles in any order: their counts grow in the log-weight column, while the scratch column holds
- * running sums; then the columns change places. */
-static void exchange_columns(pfl_t *f)
-{
-    float *counts = f->log_weight;
-    f->log_weight = f->scratch;
-    f->scratch = counts;
-}
-
-/* First particle whose running sum exceeds u. */
-static uint32_t search(const pfl_t *f, uint32_t u)
-{
-    uint32_t low = 0u;
-    uint32_t high = f->config->particles - 1u;
-    while (low < high) {
-        const uint32_t middle = low + ((high - low) / 2u);
-        if (pfl_load_u32(&f->scratch[middle]) > u) {
-            high = middle;
-        } else {
-            low = middle + 1u;
-        }
-    }
-    return low;
-}
-
-/* Adds `draws` independent draws from the running sums to the counts. */
-static void draw_independently(pfl_t *f, uint32_t total, uint32_t draws)
-{
-    for (uint32_t k = 0u; k < draws; k++) {
-        const uint64_t r = pfl_xoshiro_next(f->rng.one);
-        const uint32_t i = search(f, (uint32_t)((r * total) >> 32));
-        pfl_store_u32(&f->log_weight[i], pfl_load_u32(&f->log_weight[i]) + 1u);
-    }
-}
-
-PFL_NOINLINE static void count_multinomial(pfl_t *f)
-{
-    const uint32_t count = f->config->particles;
-    uint32_t sums[LANES];
-    uint32_t sum = 0u;
-    quantise(f, sums);
-    for (uint32_t i = 0u; i < count; i++) {
-        sum += pfl_load_u32(&f->scratch[i]);
-        pfl_store_u32(&f->scratch[i], sum);
-        pfl_store_u32(&f->log_weight[i], 0u);
-    }
-    draw_independently(f, sum, count);
-    exchange_columns(f);
-}
-
-/* One more copy to the first particles that have some. */
-static void give_away(pfl_t *f, uint32_t left)
-{
-    for (uint32_t i = 0u; left > 0u; i++) {
-        const uint32_t copies = pfl_load_u32(&f->log_weight[i]);
-        const uint32_t more = (copies > 0u) ? 1u : 0u;
-        pfl_store_u32(&f->log_weight[i], copies + more);
-        left -= more;
-    }
-}
-
-PFL_NOINLINE static void count_residual(pfl_t *f)
-{
-    const uint32_t count = f->config->particles;
-    uint32_t sums[LANES];
-    quantise(f, sums);
-    const comb_t comb = comb_of(count, total_of(sums)); /* shares q M sum to less than N + 1: copies never exceed N */
-    uint32_t bits = 32u;
-    while ((count >> (32u - bits)) != 0u) {
-        bits--; /* 2^bits N <= 2^32: remainders of that many bits cannot overflow their sum */
-    }
-    uint32_t left = count;
-    uint32_t rest = 0u;
-    for (uint32_t i = 0u; i < count; i++) {
-        const uint64_t share = ((uint64_t)pfl_load_u32(&f->scratch[i]) * comb.factor) >> comb.shift;
-        const uint32_t copies = (uint32_t)(share >> 32);
-        left -= copies;
-        rest += (uint32_t)share >> (32u - bits);
-        pfl_store_u32(&f->log_weight[i], copies);
-        pfl_store_u32(&f->scratch[i], rest);
-    }
-    if (rest != 0u) {
-        draw_independently(f, rest, left);
-    } else { /* remainders too small for their bits, N >= 65536 only */
-        give_away(f, left);
-    }
-    exchange_columns(f);
 }
 
 /* ---- Offspring counts to copies --------------------------------------------------------------------------------------- */
@@ -381,20 +263,10 @@ bool pfl_resample_is_due(const pfl_t *f)
 void pfl_resample_now(pfl_t *f)
 {
     const uint32_t start = pfl_meter_read(f);
-    switch ((pfl_resampling_t)f->config->resampling) {
-    case PFL_RESAMPLE_STRATIFIED:
-        count_stratified(f);
-        break;
-    case PFL_RESAMPLE_RESIDUAL:
-        count_residual(f);
-        break;
-    case PFL_RESAMPLE_MULTINOMIAL:
-        count_multinomial(f);
-        break;
-    case PFL_RESAMPLE_SYSTEMATIC:
-    default:
-        count_systematic(f);
-        break;
+    if (f->config->resampling != NULL) {
+        f->config->resampling(f);
+    } else {
+        pfl_systematic(f);
     }
     copy_surplus(f);
     pfl_weights_equal(f);

@@ -126,7 +126,7 @@ PFL_NOINLINE static pfl_status_t mix_answers(pfl_t *f, uint64_t *hash)
 }
 
 /* A short flight by one resampling scheme. Its configuration lies behind its arena: the stack is for the filter. */
-PFL_NOINLINE static pfl_status_t fly(void *arena, pfl_resampling_t scheme, uint64_t *hash)
+PFL_NOINLINE static pfl_status_t fly(void *arena, pfl_scheme_fn scheme, uint64_t *hash)
 {
     static const pfl_sensor_t sensor = {.loglik = bearing};
     const size_t arena_bytes = PFL_ARENA_BYTES(SELF_TEST_PARTICLES, 2, 2);
@@ -137,8 +137,9 @@ PFL_NOINLINE static pfl_status_t fly(void *arena, pfl_resampling_t scheme, uint6
     config->states = 2u;
     config->noises = 1u;
     config->sensor_count = 1u;
-    config->resampling = (uint16_t)scheme;
+    config->resampling = scheme;
     config->circular_mask = 1u;
+    config->circular = pfl_circular_means;
     config->ess_ratio = 0.75f;
     config->seed = 7u;
     config->sensors = &sensor;
@@ -161,6 +162,7 @@ PFL_NOINLINE static pfl_status_t fly(void *arena, pfl_resampling_t scheme, uint6
 
 pfl_status_t pfl_self_test(void *arena, size_t arena_bytes)
 {
+    static const pfl_scheme_fn schemes[] = {pfl_systematic, pfl_stratified, pfl_residual, pfl_multinomial};
     const uint64_t seed = 0xCBF29CE484222325u;
     if ((arena == NULL) || (((uintptr_t)arena & 7u) != 0u) || (arena_bytes < PFL_SELF_TEST_BYTES)) {
         return PFL_ERR_MEMORY;
@@ -170,8 +172,8 @@ pfl_status_t pfl_self_test(void *arena, size_t arena_bytes)
     const bool math = hash_of_math(seed) == ANSWER_MATH;
     const bool random = hash_of_random(seed, (float *)arena) == ANSWER_RANDOM;
     pfl_status_t status = PFL_OK;
-    for (uint32_t scheme = 0u; (scheme <= (uint32_t)PFL_RESAMPLE_MULTINOMIAL) && (status == PFL_OK); scheme++) {
-        status = fly(arena, (pfl_resampling_t)scheme, &flight);
+    for (uint32_t k = 0u; (k < (sizeof schemes / sizeof schemes[0])) && (status == PFL_OK); k++) {
+        status = fly(arena, schemes[k], &flight);
     }
     const bool flown = (status == PFL_OK) && (flight == ANSWER_FLIGHT);
     return (arithmetic && math && random && flown) ? PFL_OK : PFL_ERR_SELF_TEST;

@@ -312,6 +312,8 @@ static pfl_t *fly(run_t *run)
     return f;
 }
 
+static const pfl_scheme_fn schemes[] = {pfl_systematic, pfl_stratified, pfl_residual, pfl_multinomial};
+
 static void of_schemes(void)
 {
     static const uint32_t sizes[] = {1u, 7u, 16u, 17u, 64u, 65u, 80u, 300u, 1000u};
@@ -323,7 +325,7 @@ static void of_schemes(void)
             begin(scheme);
             for (size_t s = 0u; s < (sizeof sizes / sizeof sizes[0]); s++) {
                 for (uint16_t d = 1u; d <= D_MAX; d++) {
-                    mill_run(&run, sizes[s], d)->config.resampling = scheme;
+                    mill_run(&run, sizes[s], d)->config.resampling = schemes[scheme];
                     run.config.moments = moments;
                     (void)fly(&run);
                 }
@@ -343,6 +345,7 @@ static void of_options(void)
     for (uint32_t n = 1u; n <= 300u; n += 23u) {
         for (uint16_t d = 1u; d <= D_MAX; d++) {
             mill_run(&run, n, d)->config.circular_mask = 0x2Du & ((1u << d) - 1u);
+            run.config.circular = pfl_circular_means;
             (void)fly(&run);
         }
     }
@@ -402,8 +405,9 @@ static void of_constraint_and_kernel(void)
     begin(14u);
     for (size_t k = 0u; k < (sizeof kernel / sizeof kernel[0]); k++) {
         for (uint16_t scheme = 0u; scheme < 4u; scheme++) {
-            mill_run(&run, 300u, 4u)->config.resampling = scheme;
+            mill_run(&run, 300u, 4u)->config.resampling = schemes[scheme];
             run.config.circular_mask = 1u;
+            run.config.circular = pfl_circular_means;
             run.config.ess_ratio = 0.9f;
             run.config.kernel = &kernel[k];
             (void)fly(&run);
@@ -445,7 +449,7 @@ static void of_forecast(void)
     run_t run;
     begin(21u);
     for (uint16_t scheme = 0u; scheme < 4u; scheme++) {
-        mill_run(&run, 300u, 4u)->config.resampling = scheme;
+        mill_run(&run, 300u, 4u)->config.resampling = schemes[scheme];
         pfl_t *f = fly(&run);
         pfl_t *ahead = NULL;
         require("pfl_forecast", pfl_forecast(f, &second, sizeof second, &horizon, mean, cov, &ahead));
@@ -551,6 +555,7 @@ static void of_odometry(void)
         mill_run(&run, 300u, 3u)->config.sensor_count = 2u;
         run.config.noises = 4u;
         run.config.circular_mask = 4u;
+        run.config.circular = pfl_circular_means;
         run.config.predict = pfl_odometry_predict;
         run.config.draw = NULL;
         run.config.user = (void *)(uintptr_t)&model;

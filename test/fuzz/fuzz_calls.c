@@ -205,13 +205,14 @@ static void project(void *user, const pfl_batch_t *p)
 
 static void choose_sizes(stream_t *in, pfl_config_t *c)
 {
+    static const pfl_scheme_fn schemes[] = {pfl_systematic, pfl_stratified, pfl_residual, pfl_multinomial};
     static const uint8_t particles[] = {1u, 2u, 3u, 4u, 5u, 7u, 8u, 9u, 12u, 15u, 16u, 17u, 20u, 33u, 65u, PARTICLES};
     c->abi = PFL_ABI;
     c->particles = particles[take_below(in, 16u)];
     c->states = (uint16_t)(1u + take_below(in, STATES));
     c->noises = (uint16_t)take_below(in, STATES + 1u);
     c->sensor_count = (uint16_t)take_below(in, 4u);
-    c->resampling = (uint16_t)take_below(in, 4u);
+    c->resampling = schemes[take_below(in, 4u)];
     c->seed = take_below(in, 4u);
     c->ess_ratio = (float)take_below(in, 5u) / 4.0f;
 }
@@ -223,6 +224,7 @@ static void choose_options(stream_t *in, setup_t *s)
     const uint8_t bits = take_u8(in);
     c->moments = ((bits & 7u) == 0u) ? PFL_MOMENTS_MEAN : PFL_MOMENTS_FULL;
     c->circular_mask = ((bits & 8u) != 0u) ? (take_u8(in) & ((1u << c->states) - 1u)) : 0u;
+    c->circular = pfl_circular_means;
     c->dt_max_us = longest_us[(bits >> 4) & 3u];
     c->draw = ((bits & 0xC0u) == 0u) ? NULL : draw;
     c->budget_cycles = take_u8(in);

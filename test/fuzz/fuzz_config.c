@@ -141,6 +141,7 @@ static void choose_watch(stream_t *in, setup_t *s)
 
 static void choose(stream_t *in, setup_t *s)
 {
+    static const pfl_scheme_fn schemes[] = {pfl_systematic, pfl_stratified, pfl_residual, pfl_multinomial};
     pfl_config_t *c = &s->config;
     memset(s, 0, sizeof *s);
     const uint8_t odd = take_u8(in);
@@ -149,10 +150,10 @@ static void choose(stream_t *in, setup_t *s)
     c->states = (uint16_t)field(in, PFL_STATES_MAX);
     c->noises = (uint16_t)field(in, PFL_NOISES_MAX);
     c->sensor_count = (uint16_t)field(in, 3u);
-    c->resampling = (uint16_t)field(in, PFL_RESAMPLE_MULTINOMIAL);
+    c->resampling = schemes[take_u8(in) & 3u];
     c->moments = (uint16_t)field(in, PFL_MOMENTS_MEAN);
-    c->reserved = ((odd & 0x1Fu) == 2u) ? take_u16(in) : 0u;
     c->circular_mask = field(in, 3u);
+    c->circular = ((odd & 0x1Fu) == 2u) ? NULL : pfl_circular_means;
     c->ess_ratio = ((odd & 0x20u) != 0u) ? take_float(in) : 0.5f;
     c->seed = field(in, 3u);
     c->dt_max_us = ((odd & 0x40u) != 0u) ? take_u32(in) : 0u;
@@ -174,8 +175,8 @@ static void choose(stream_t *in, setup_t *s)
 static bool numbers_are_legal(const pfl_config_t *c)
 {
     return c->particles >= 1u && c->particles <= PFL_PARTICLES_MAX && c->states >= 1u && c->states <= PFL_STATES_MAX &&
-           c->noises <= PFL_NOISES_MAX && c->sensor_count <= PFL_SENSORS_MAX &&
-           c->resampling <= PFL_RESAMPLE_MULTINOMIAL && c->moments <= PFL_MOMENTS_MEAN && c->reserved == 0u &&
+           c->noises <= PFL_NOISES_MAX && c->sensor_count <= PFL_SENSORS_MAX && c->moments <= PFL_MOMENTS_MEAN &&
+           (c->circular_mask == 0u || c->circular != NULL) &&
            ((uint64_t)c->circular_mask < ((uint64_t)1u << c->states)) && c->ess_ratio >= 0.0f && c->ess_ratio <= 1.0f &&
            c->predict != NULL;
 }

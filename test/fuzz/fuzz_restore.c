@@ -66,6 +66,7 @@ static const pfl_watch_t watch = {.ok_sigma = ok_sigma, .reinject = 0.3f, .lost_
 
 static void make_shape(shape_t *s, uint32_t k)
 {
+    static const pfl_scheme_fn schemes[] = {pfl_systematic, pfl_stratified, pfl_residual, pfl_multinomial};
     static const uint8_t particles[SHAPES] = {1u, 2u, 3u, 5u, 8u, 9u, 17u, PARTICLES_MAX};
     const float z = 0.3f;
     const float news = 0.2f; /* the same once more would be refused by a watch */
@@ -74,9 +75,10 @@ static void make_shape(shape_t *s, uint32_t k)
                                .states = (uint16_t)(1u + (k % STATES_MAX)),
                                .noises = (uint16_t)(k % 3u),
                                .sensor_count = 1u,
-                               .resampling = (uint16_t)(k % 4u),
+                               .resampling = schemes[k % 4u],
                                .moments = (k == 2u) ? PFL_MOMENTS_MEAN : PFL_MOMENTS_FULL,
                                .circular_mask = k & 1u,
+                               .circular = pfl_circular_means,
                                .ess_ratio = (k == 4u) ? 0.0f : 0.6f,
                                .seed = k % 4u,
                                .sensors = &sensor,

@@ -22,6 +22,10 @@
 #define DT 0.5
 #define SENSOR_SIGMA 0.8
 
+enum { SYSTEMATIC, STRATIFIED, RESIDUAL, MULTINOMIAL, SCHEMES };
+
+static const pfl_scheme_fn schemes[SCHEMES] = {pfl_systematic, pfl_stratified, pfl_residual, pfl_multinomial};
+
 static union {
     uint64_t align;
     unsigned char bytes[PFL_ARENA_BYTES(N_MAX, 2, 2)];
@@ -189,7 +193,7 @@ static void fly(uint32_t n, uint16_t scheme, uint64_t seed, const posterior_t *e
     c.states = model->states;
     c.noises = model->states;
     c.sensor_count = 1u;
-    c.resampling = scheme;
+    c.resampling = schemes[scheme];
     c.ess_ratio = 0.5f;
     c.seed = seed;
     c.sensors = &sensor;
@@ -254,40 +258,40 @@ static void assert_converges(const model_t *flown, uint16_t scheme)
 
 void test_scalar_systematic(void)
 {
-    assert_converges(&scalar, PFL_RESAMPLE_SYSTEMATIC);
+    assert_converges(&scalar, SYSTEMATIC);
 }
 
 void test_scalar_stratified(void)
 {
-    assert_converges(&scalar, PFL_RESAMPLE_STRATIFIED);
+    assert_converges(&scalar, STRATIFIED);
 }
 
 void test_scalar_residual(void)
 {
-    assert_converges(&scalar, PFL_RESAMPLE_RESIDUAL);
+    assert_converges(&scalar, RESIDUAL);
 }
 
 void test_scalar_multinomial(void)
 {
-    assert_converges(&scalar, PFL_RESAMPLE_MULTINOMIAL);
+    assert_converges(&scalar, MULTINOMIAL);
 }
 
 void test_moving_systematic(void)
 {
-    assert_converges(&moving, PFL_RESAMPLE_SYSTEMATIC);
+    assert_converges(&moving, SYSTEMATIC);
 }
 
 void test_moving_stratified(void)
 {
-    assert_converges(&moving, PFL_RESAMPLE_STRATIFIED);
+    assert_converges(&moving, STRATIFIED);
 }
 
 void test_moving_residual(void)
 {
-    assert_converges(&moving, PFL_RESAMPLE_RESIDUAL);
+    assert_converges(&moving, RESIDUAL);
 }
 
 void test_moving_multinomial(void)
 {
-    assert_converges(&moving, PFL_RESAMPLE_MULTINOMIAL);
+    assert_converges(&moving, MULTINOMIAL);
 }

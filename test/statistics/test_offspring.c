@@ -13,8 +13,11 @@
 
 #define N_MAX 300u
 #define ROUNDS 40000u
-#define SCHEMES 4u
 #define ROUNDING 1.0e-5 /* of an offspring: weights are floats, cut to 2e9 quanta */
+
+enum { SYSTEMATIC, STRATIFIED, RESIDUAL, MULTINOMIAL, SCHEMES };
+
+static const pfl_scheme_fn schemes[SCHEMES] = {pfl_systematic, pfl_stratified, pfl_residual, pfl_multinomial};
 
 static union {
     uint64_t align;
@@ -93,7 +96,7 @@ static void resample_often(uint32_t n, uint16_t scheme)
     c.particles = n;
     c.states = 1u;
     c.sensor_count = 1u;
-    c.resampling = scheme;
+    c.resampling = schemes[scheme];
     c.moments = PFL_MOMENTS_MEAN;
     c.seed = ((uint64_t)n << 8) + scheme;
     c.sensors = &sensor;
@@ -151,13 +154,13 @@ static void exact_variances(uint32_t n, uint16_t scheme, double *v)
     for (uint32_t i = 0u; i < n; i++) {
         const double fraction = share[i] - floor(share[i]);
         switch (scheme) {
-        case PFL_RESAMPLE_SYSTEMATIC:
+        case SYSTEMATIC:
             v[i] = spread(fraction);
             break;
-        case PFL_RESAMPLE_STRATIFIED:
+        case STRATIFIED:
             v[i] = stratified_variance(from, share[i]);
             break;
-        case PFL_RESAMPLE_RESIDUAL:
+        case RESIDUAL:
             v[i] = rest * spread(fraction / rest);
             break;
         default:
@@ -209,9 +212,9 @@ static void check_all(uint32_t n, bool dead_end)
     for (uint16_t scheme = 0u; scheme < SCHEMES; scheme++) {
         sum[scheme] = check(n, scheme);
     }
-    TEST_ASSERT_TRUE(sum[PFL_RESAMPLE_SYSTEMATIC] <= sum[PFL_RESAMPLE_STRATIFIED]);
-    TEST_ASSERT_TRUE(sum[PFL_RESAMPLE_STRATIFIED] <= sum[PFL_RESAMPLE_MULTINOMIAL]);
-    TEST_ASSERT_TRUE(sum[PFL_RESAMPLE_RESIDUAL] <= sum[PFL_RESAMPLE_MULTINOMIAL]);
+    TEST_ASSERT_TRUE(sum[SYSTEMATIC] <= sum[STRATIFIED]);
+    TEST_ASSERT_TRUE(sum[STRATIFIED] <= sum[MULTINOMIAL]);
+    TEST_ASSERT_TRUE(sum[RESIDUAL] <= sum[MULTINOMIAL]);
 }
 
 void test_64_particles(void)

@@ -116,6 +116,7 @@ static void fly_in_exact_arena(uint32_t n, uint16_t states, uint16_t noises, uin
     pfl_config_t c = ut_dictated_config(n, states);
     c.noises = noises;
     c.circular_mask = circular;
+    c.circular = pfl_circular_means;
     pfl_t *f = ut_filter(&c);
     for (uint32_t i = 0u; i < n; i++) {
         zeros[i] = -0.01f * (float)i;
@@ -223,21 +224,28 @@ void test_largest_sizes_are_in_range(void)
 
 void test_choices_out_of_range_are_refused(void)
 {
-    config.resampling = (uint16_t)PFL_RESAMPLE_MULTINOMIAL + 1u;
-    refused_as(PFL_ERR_CONFIG);
-    config.resampling = UINT16_MAX;
-    refused_as(PFL_ERR_CONFIG);
     config.moments = (uint16_t)PFL_MOMENTS_MEAN + 1u;
     refused_as(PFL_ERR_CONFIG);
     config.moments = UINT16_MAX;
     refused_as(PFL_ERR_CONFIG);
-    config.reserved = 1u;
-    refused_as(PFL_ERR_CONFIG);
+    config.circular = pfl_circular_means;
     config.circular_mask = 1u << D;
     refused_as(PFL_ERR_CONFIG);
+    config.circular = pfl_circular_means;
     config.circular_mask = 0x80000000u;
     refused_as(PFL_ERR_CONFIG);
+    config.circular = pfl_circular_means;
     config.circular_mask = (1u << D) - 1u;
+    accepted();
+}
+
+void test_angles_without_what_averages_them_are_refused(void)
+{
+    config.circular_mask = 1u;
+    refused_as(PFL_ERR_CONFIG);
+    config.circular = pfl_circular_means;
+    accepted();
+    config.circular_mask = 0u;
     accepted();
 }
 

@@ -305,6 +305,7 @@ void test_kernel_leaves_a_cloud_alone_that_is_too_wide(void)
         config.user = (void *)(uintptr_t)&table;
         config.kernel = &kernel;
         config.circular_mask = circular;
+        config.circular = pfl_circular_means;
         pfl_t *f = ut_filter(&config);
         TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_resample(f));
         TEST_ASSERT_TRUE(pfl_invariants_hold(f));
@@ -382,6 +383,7 @@ void test_kernel_goes_the_short_way_round_the_circle(void)
 
     config.kernel = &kernel;
     config.circular_mask = 1u;
+    config.circular = pfl_circular_means;
     config.draw = draw_at_the_seam;
     pfl_t *f = ut_filter(&config);
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_resample(f));

@@ -98,6 +98,7 @@ static pfl_t *weighed(uint32_t n, uint16_t states, uint32_t circular_mask, pfl_m
     pfl_config_t *c = (pfl_config_t *)ut_arena(sizeof *c);
     *c = ut_dictated_config(n, states);
     c->circular_mask = circular_mask;
+    c->circular = pfl_circular_means;
     c->moments = (uint16_t)moments;
     c->draw = ut_table_draw;
     c->user = &table;

@@ -16,8 +16,11 @@
 #endif
 
 #define N_MAX 4096u
-#define SCHEMES 4u
 #define KINDS 12u
+
+enum { SYSTEMATIC, STRATIFIED, RESIDUAL, MULTINOMIAL, SCHEMES };
+
+static const pfl_scheme_fn schemes[SCHEMES] = {pfl_systematic, pfl_stratified, pfl_residual, pfl_multinomial};
 
 static float ll[N_MAX];
 static float log_weights[N_MAX];
@@ -131,7 +134,7 @@ static pfl_config_t indexed(uint32_t n, uint32_t scheme, float ess_ratio)
 {
     pfl_config_t c = ut_dictated_config(n, 1u);
     c.predict = ut_index_predict;
-    c.resampling = (uint16_t)scheme;
+    c.resampling = schemes[scheme];
     c.moments = (uint16_t)PFL_MOMENTS_MEAN;
     c.ess_ratio = ess_ratio;
     return c;
@@ -311,17 +314,17 @@ static void counts_follow(uint32_t scheme, rule_t rule)
 
 void test_systematic_counts_are_floor_or_ceiling_of_the_share(void)
 {
-    counts_follow(PFL_RESAMPLE_SYSTEMATIC, FLOOR_OR_CEIL);
+    counts_follow(SYSTEMATIC, FLOOR_OR_CEIL);
 }
 
 void test_stratified_counts_are_within_two_of_the_share(void)
 {
-    counts_follow(PFL_RESAMPLE_STRATIFIED, WITHIN_TWO);
+    counts_follow(STRATIFIED, WITHIN_TWO);
 }
 
 void test_residual_counts_are_at_least_the_floor_of_the_share(void)
 {
-    counts_follow(PFL_RESAMPLE_RESIDUAL, AT_LEAST_FLOOR);
+    counts_follow(RESIDUAL, AT_LEAST_FLOOR);
 }
 
 /* Mean counts over many resamplings against the shares, 5 standard errors of the multinomial. */
@@ -428,7 +431,7 @@ void test_particles_are_copied_whole(void)
     for (uint32_t scheme = 0u; scheme < SCHEMES; scheme++) {
         pfl_view_t view;
         pfl_config_t c = ut_dictated_config(N, D);
-        c.resampling = (uint16_t)scheme;
+        c.resampling = schemes[scheme];
         c.draw = ut_table_draw;
         c.user = (void *)(uintptr_t)&table;
         pfl_t *f = ut_filter(&c);
@@ -447,7 +450,7 @@ void test_resampling_is_counted(void)
 {
     enum { N = 20 };
     pfl_health_t health;
-    pfl_config_t c = indexed(N, PFL_RESAMPLE_SYSTEMATIC, 0.0f);
+    pfl_config_t c = indexed(N, SYSTEMATIC, 0.0f);
     pfl_t *f = ut_filter(&c);
     for (uint32_t k = 1u; k <= 3u; k++) {
         TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_resample(f));
@@ -460,7 +463,7 @@ void test_resampling_is_counted(void)
 static uint32_t resamplings(float ess_ratio, uint32_t kind, uint32_t n)
 {
     pfl_health_t health;
-    pfl_config_t c = indexed(n, PFL_RESAMPLE_SYSTEMATIC, ess_ratio);
+    pfl_config_t c = indexed(n, SYSTEMATIC, ess_ratio);
     pfl_t *f = ut_filter(&c);
     make_set(kind, n);
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_update(f, 0u, 0u, ll));
@@ -478,7 +481,7 @@ void test_ess_ratio_decides_on_the_effective_sample_size(void)
     enum { N = 100 };
     for (uint32_t giants = 1u; giants < N; giants++) {
         pfl_health_t health;
-        pfl_config_t c = indexed(N, PFL_RESAMPLE_SYSTEMATIC, 0.505f);
+        pfl_config_t c = indexed(N, SYSTEMATIC, 0.505f);
         pfl_t *f = ut_filter(&c);
         for (uint32_t i = 0u; i < N; i++) {
             ll[i] = (i < giants) ? 0.0f : -ut_infinity();
@@ -505,7 +508,7 @@ void test_far_off_measurement_keeps_the_order_of_particles(void)
     static const float nearest[] = {-1.0e3f, -1.0e6f, -1.0e8f, -1.0e10f, -1.0e15f, -1.0e30f};
     for (size_t row = 0u; row < (sizeof nearest / sizeof nearest[0]); row++) {
         char text[48];
-        pfl_config_t c = indexed(N, PFL_RESAMPLE_SYSTEMATIC, 0.0f);
+        pfl_config_t c = indexed(N, SYSTEMATIC, 0.0f);
         pfl_t *f = ut_filter(&c);
         clock_us = 0u;
         (void)snprintf(text, sizeof text, "nearest at ll = %g", (double)nearest[row]);

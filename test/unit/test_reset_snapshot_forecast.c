@@ -110,6 +110,7 @@ void test_the_jump_of_an_angle_is_wrapped(void)
     float delta = 0.0f;
     pfl_config_t c = ut_dictated_config(N, 1u);
     c.circular_mask = 1u;
+    c.circular = pfl_circular_means;
     c.draw = seam_draw;
     c.user = &angle;
     pfl_t *f = ut_filter(&c);
@@ -223,9 +224,10 @@ static uint64_t fly_on(pfl_t *f, uint32_t from)
 
 void test_a_restored_filter_continues_with_the_same_bits(void)
 {
-    for (uint16_t scheme = 0u; scheme <= (uint16_t)PFL_RESAMPLE_MULTINOMIAL; scheme++) {
+    static const pfl_scheme_fn schemes[] = {pfl_systematic, pfl_stratified, pfl_residual, pfl_multinomial};
+    for (size_t k = 0u; k < (sizeof schemes / sizeof schemes[0]); k++) {
         pfl_config_t c = ut_linear_config(N);
-        c.resampling = scheme;
+        c.resampling = schemes[k];
         pfl_t *f = flown(&c, 8u);
         const unsigned char *kept = ut_snapshot(f);
         const size_t bytes = pfl_snapshot_bytes(f);

@@ -30,7 +30,7 @@ static void *constant(const void *in)
 }
 
 /* A filter that has drawn and moved its particles. */
-static void start(const pfl_position_t *sees, pfl_moments_t moments, uint32_t circular, pfl_resampling_t scheme)
+static void start(const pfl_position_t *sees, pfl_moments_t moments, uint32_t circular, pfl_scheme_fn scheme)
 {
     static const pfl_config_t none;
     config = none;
@@ -40,9 +40,10 @@ static void start(const pfl_position_t *sees, pfl_moments_t moments, uint32_t ci
     config.states = 4u;
     config.noises = 2u;
     config.sensor_count = 1u;
-    config.resampling = (uint16_t)scheme;
+    config.resampling = scheme;
     config.moments = (uint16_t)moments;
     config.circular_mask = circular;
+    config.circular = pfl_circular_means;
     config.sensors = &sensor;
     config.predict = pfl_constant_velocity_predict;
     config.draw = draw;
@@ -54,12 +55,12 @@ static void start(const pfl_position_t *sees, pfl_moments_t moments, uint32_t ci
 /* The same with weights; the prediction after them makes the moments stale. */
 static void weighed(pfl_moments_t moments, uint32_t circular)
 {
-    start(&broad, moments, circular, PFL_RESAMPLE_SYSTEMATIC);
+    start(&broad, moments, circular, pfl_systematic);
     (void)pfl_update(kernel_data.filter, 0u, 100000u, seen);
     (void)pfl_predict(kernel_data.filter, 200000u, NULL);
 }
 
-static void with_weights(const pfl_position_t *sees, pfl_resampling_t scheme)
+static void with_weights(const pfl_position_t *sees, pfl_scheme_fn scheme)
 {
     start(sees, PFL_MOMENTS_MEAN, 0u, scheme);
     (void)pfl_update(kernel_data.filter, 0u, 100000u, seen);
@@ -69,7 +70,7 @@ static void with_weights(const pfl_position_t *sees, pfl_resampling_t scheme)
 
 static void before_cycle(void)
 {
-    start(&broad, PFL_MOMENTS_MEAN, 0u, PFL_RESAMPLE_SYSTEMATIC);
+    start(&broad, PFL_MOMENTS_MEAN, 0u, pfl_systematic);
 }
 static void before_mean(void)
 {
@@ -85,27 +86,27 @@ static void before_circle(void)
 }
 static void before_equal(void)
 {
-    with_weights(&blind, PFL_RESAMPLE_SYSTEMATIC);
+    with_weights(&blind, pfl_systematic);
 }
 static void before_systematic(void)
 {
-    with_weights(&broad, PFL_RESAMPLE_SYSTEMATIC);
+    with_weights(&broad, pfl_systematic);
 }
 static void before_degenerate(void)
 {
-    with_weights(&sharp, PFL_RESAMPLE_SYSTEMATIC);
+    with_weights(&sharp, pfl_systematic);
 }
 static void before_stratified(void)
 {
-    with_weights(&broad, PFL_RESAMPLE_STRATIFIED);
+    with_weights(&broad, pfl_stratified);
 }
 static void before_residual(void)
 {
-    with_weights(&broad, PFL_RESAMPLE_RESIDUAL);
+    with_weights(&broad, pfl_residual);
 }
 static void before_multinomial(void)
 {
-    with_weights(&broad, PFL_RESAMPLE_MULTINOMIAL);
+    with_weights(&broad, pfl_multinomial);
 }
 
 /* ---- Kernels --------------------------------------------------------------------------------------------------------- */

@@ -28,7 +28,6 @@ static pfl_config_t make_config(gps_particles_t *p, uint32_t run)
         .abi = PFL_ABI,
         .particles = study->particles,
         .sensor_count = GPS_SENSORS,
-        .resampling = PFL_RESAMPLE_SYSTEMATIC,
         .ess_ratio = 0.5f,
         .seed = host_random_u64(&random),
         .sensors = p->sensor,

@@ -76,6 +76,7 @@ void gps_particles_turn(gps_particles_t *particles, pfl_config_t *config)
     config->states = particles->coloured ? PFL_TURN_REMEMBER_STATES : PFL_TURN_STATES;
     config->noises = 4u;
     config->circular_mask = 1u << PFL_TURN_HEADING;
+    config->circular = pfl_circular_means;
     config->moments = (uint16_t)(particles->study->kernel ? PFL_MOMENTS_FULL : PFL_MOMENTS_MEAN);
     config->predict = pfl_turn_predict;
     config->draw = draw;

@@ -33,6 +33,7 @@ static void read_settings(const study_t *study, land_study_t *s)
 {
     static const double sigma_w[LAND_CASES] = {5.0, 10.0, 15.0};
     static const double sigma_z[LAND_CASES] = {10.0, 15.0, 20.0};
+    static const pfl_scheme_fn schemes[] = {pfl_systematic, pfl_stratified, pfl_residual, pfl_multinomial};
 
     s->filter = strcmp(study->filter, "pf") == 0 ? LAND_PF : LAND_KF;
     s->filter = strcmp(study->filter, "ukf") == 0 ? LAND_UKF : s->filter;
@@ -43,7 +44,7 @@ static void read_settings(const study_t *study, land_study_t *s)
     s->jitter = study_is(study, "jitter", "on");
     s->optimal = study_is(study, "proposal", "optimal");
     s->theta = (float)study_number(study, "theta");
-    s->resampling = (pfl_resampling_t)study_choice(study, "resampling");
+    s->resampling = schemes[study_choice(study, "resampling")];
     s->particles = study->particles;
     s->seed = study->seed;
     s->w_variance = sigma_w[s->case_index] * (s->std_reading ? sigma_w[s->case_index] : 1.0);

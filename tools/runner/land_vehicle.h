@@ -40,7 +40,7 @@ typedef struct {
     bool jitter;
     bool optimal; /* the optimal proposal instead of the model's noise */
     float theta;
-    pfl_resampling_t resampling;
+    pfl_scheme_fn resampling;
     uint32_t particles;
     uint64_t seed;
     double w_variance; /* of the velocity disturbance on each axis [m^2/s^2] */

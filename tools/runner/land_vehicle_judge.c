@@ -41,7 +41,7 @@ static bool is_value(float x, float value)
 /* The page's particle filter: systematic resampling with one of its two thresholds. */
 static bool is_page_pf(const land_study_t *s)
 {
-    return s->resampling == PFL_RESAMPLE_SYSTEMATIC && (is_value(s->theta, 0.5f) || is_value(s->theta, 1.0f));
+    return s->resampling == pfl_systematic && (is_value(s->theta, 0.5f) || is_value(s->theta, 1.0f));
 }
 
 static void accept(metric_t *metric, double lo, double hi)

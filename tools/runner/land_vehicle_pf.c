@@ -97,7 +97,7 @@ static pfl_config_t make_config(const land_study_t *study, uint32_t run, model_t
         .states = study->optimal ? STATES_MAX : PFL_LAND_STATES,
         .noises = study->jitter ? 4u : 2u,
         .sensor_count = 1u,
-        .resampling = (uint16_t)study->resampling,
+        .resampling = study->resampling,
         .moments = PFL_MOMENTS_MEAN,
         .ess_ratio = study->theta,
         .seed = host_random_u64(&random),

@@ -36,24 +36,24 @@ static const double paper_average[UAV_OF_WIND] = {1.312, 11.08, 0.873};
 typedef struct {
     char set;
     uint32_t particles;
-    pfl_resampling_t scheme;
+    pfl_scheme_fn scheme;
     double resample_below; /* 0: never */
     bool distance;
     double figure[UAV_OF_WIND];
 } reference_t;
 
 static const reference_t references[] = {
-    {'S', 1000u, PFL_RESAMPLE_MULTINOMIAL, 0.25, false, {1.326, 10.80, 0.871}},
-    {'G', 1000u, PFL_RESAMPLE_MULTINOMIAL, 0.25, false, {1.296, 11.90, 0.862}},
-    {'S', 1000u, PFL_RESAMPLE_MULTINOMIAL, 0.0, false, {4.5, 14.2, 2.66}},
-    {'S', 100u, PFL_RESAMPLE_MULTINOMIAL, 0.25, false, {1.33, 9.2, 0.86}},
-    {'S', 200u, PFL_RESAMPLE_MULTINOMIAL, 0.25, false, {1.33, 9.7, 0.87}},
-    {'S', 500u, PFL_RESAMPLE_MULTINOMIAL, 0.25, false, {1.33, 10.4, 0.87}},
-    {'S', 2000u, PFL_RESAMPLE_MULTINOMIAL, 0.25, false, {1.33, 11.0, 0.87}},
-    {'S', 1000u, PFL_RESAMPLE_MULTINOMIAL, 0.5, false, {1.22, 10.4, 0.79}},
-    {'S', 1000u, PFL_RESAMPLE_MULTINOMIAL, 1.0, false, {1.15, 10.9, 0.73}},
-    {'S', 1000u, PFL_RESAMPLE_SYSTEMATIC, 0.25, false, {1.33, 10.9, 0.87}},
-    {'S', 1000u, PFL_RESAMPLE_MULTINOMIAL, 0.25, true, {1.87, 11.6, 1.31}},
+    {'S', 1000u, pfl_multinomial, 0.25, false, {1.326, 10.80, 0.871}},
+    {'G', 1000u, pfl_multinomial, 0.25, false, {1.296, 11.90, 0.862}},
+    {'S', 1000u, pfl_multinomial, 0.0, false, {4.5, 14.2, 2.66}},
+    {'S', 100u, pfl_multinomial, 0.25, false, {1.33, 9.2, 0.86}},
+    {'S', 200u, pfl_multinomial, 0.25, false, {1.33, 9.7, 0.87}},
+    {'S', 500u, pfl_multinomial, 0.25, false, {1.33, 10.4, 0.87}},
+    {'S', 2000u, pfl_multinomial, 0.25, false, {1.33, 11.0, 0.87}},
+    {'S', 1000u, pfl_multinomial, 0.5, false, {1.22, 10.4, 0.79}},
+    {'S', 1000u, pfl_multinomial, 1.0, false, {1.15, 10.9, 0.73}},
+    {'S', 1000u, pfl_systematic, 0.25, false, {1.33, 10.9, 0.87}},
+    {'S', 1000u, pfl_multinomial, 0.25, true, {1.87, 11.6, 1.31}},
 };
 
 static const double *table_reference(const uav_study_t *s)

@@ -141,8 +141,8 @@ static const unknown_wind_t unknown_winds[] = {
 
 static const unknown_wind_t *unknown_wind_page(const uav_study_t *s)
 {
-    const bool page_scheme = s->kernel ? s->scheme == PFL_RESAMPLE_SYSTEMATIC && uav_is_value(s->resample_below, 0.5)
-                                       : s->scheme == PFL_RESAMPLE_MULTINOMIAL && uav_is_value(s->resample_below, 0.25);
+    const bool page_scheme = s->kernel ? s->scheme == pfl_systematic && uav_is_value(s->resample_below, 0.5)
+                                       : s->scheme == pfl_multinomial && uav_is_value(s->resample_below, 0.25);
 
     for (size_t i = 0u; i < sizeof unknown_winds / sizeof unknown_winds[0]; i++) {
         const unknown_wind_t *row = &unknown_winds[i];

@@ -79,7 +79,7 @@ static void set_page(uav_study_t *s)
 /* The kernel comes with a scheme and a threshold of its own. */
 static void set_page_resampling(uav_study_t *s)
 {
-    s->scheme = s->kernel ? PFL_RESAMPLE_SYSTEMATIC : PFL_RESAMPLE_MULTINOMIAL;
+    s->scheme = s->kernel ? pfl_systematic : pfl_multinomial;
     s->resample_below = s->kernel ? 0.5 : 0.25;
 }
 
@@ -99,6 +99,8 @@ static void read_wind(const study_t *study, uav_study_t *s)
 
 static void read_filter(const study_t *study, uav_study_t *s)
 {
+    static const pfl_scheme_fn schemes[] = {pfl_systematic, pfl_stratified, pfl_residual, pfl_multinomial};
+
     s->ekf = strcmp(study->filter, "ekf") == 0;
     if (!study_is(study, "filter_wind", "auto")) {
         s->wind_model = (uav_wind_model_t)(study_choice(study, "filter_wind") - 1u);
@@ -108,7 +110,7 @@ static void read_filter(const study_t *study, uav_study_t *s)
     }
     set_page_resampling(s);
     if (!study_is(study, "scheme", "auto")) {
-        s->scheme = (pfl_resampling_t)(study_choice(study, "scheme") - 1u);
+        s->scheme = schemes[study_choice(study, "scheme") - 1u];
     }
     if (!study_is(study, "nlim", "auto")) {
         s->resample_below = study_number(study, "nlim");

@@ -50,7 +50,7 @@ typedef struct {
     uav_wind_model_t wind_model;
     double wind_walk;
     bool resampling;
-    pfl_resampling_t scheme;
+    pfl_scheme_fn scheme;
     double resample_below; /* share of N */
     bool kernel;
     bool optimal;  /* the optimal proposal instead of the gusts as they are */

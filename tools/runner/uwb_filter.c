@@ -105,6 +105,7 @@ static pfl_config_t make_config(const uwb_study_t *s, uint32_t run, model_t *mod
         .sensor_count = 1u,
         .moments = PFL_MOMENTS_MEAN,
         .circular_mask = s->indoor ? 1u << PFL_ODO_HEADING : 0u,
+        .circular = pfl_circular_means,
         .ess_ratio = 0.5f,
         .seed = host_random_u64(&random),
         .sensors = sensor,

@@ -1,7 +1,7 @@
 /* The runner with other choices in its filters than the scenarios make: linked into it with the linker's --wrap, so that
  * every scenario takes part as it is. For tools/study; what it asks for comes in the environment:
  *
- * PFLIGHT_STUDY_SCHEME=0..3      the resampling scheme, a pfl_resampling_t
+ * PFLIGHT_STUDY_SCHEME=0..3      the resampling scheme: systematic, stratified, residual, multinomial
  * PFLIGHT_STUDY_ESS=R            ess_ratio, of filters whose configuration has one
  * PFLIGHT_STUDY_NOISE=KIND       plain, antithetic, quasi, array (noise.h)
  * PFLIGHT_STUDY_VALUES=FILE      the runs' values go there, one line a run
@@ -82,6 +82,7 @@ static bool take_noise(const pfl_config_t *config)
 
 WRAP(pfl_status_t, pfl_init, (void *arena, size_t arena_bytes, const pfl_config_t *config, uint64_t t_us, pfl_t **out))
 {
+    static const pfl_scheme_fn schemes[] = {pfl_systematic, pfl_stratified, pfl_residual, pfl_multinomial};
     const char *scheme = wish("PFLIGHT_STUDY_SCHEME", NULL);
     const char *ess = wish("PFLIGHT_STUDY_ESS", NULL);
 
@@ -98,7 +99,7 @@ WRAP(pfl_status_t, pfl_init, (void *arena, size_t arena_bytes, const pfl_config_
     }
     latest->config = *config;
     if (scheme != NULL) {
-        latest->config.resampling = (uint16_t)strtoul(scheme, NULL, 10);
+        latest->config.resampling = schemes[strtoul(scheme, NULL, 10) & 3u];
     }
     if (ess != NULL && config->ess_ratio > 0.0f) {
         latest->config.ess_ratio = strtof(ess, NULL);

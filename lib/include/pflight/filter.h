@@ -23,7 +23,7 @@
 extern "C" {
 #endif
 
-#define PFL_ABI 0x70660002u          /* write it into pfl_config_t.abi */
+#define PFL_ABI 0x70660003u          /* write it into pfl_config_t.abi */
 #define PFL_BATCH 128u               /* particles in one callback, at most */
 #define PFL_PARTICLES_MAX 1048576u   /* N */
 #define PFL_STATES_MAX 16u           /* D */
@@ -110,15 +110,6 @@ typedef struct {
     uint16_t frozen_after; /* refuse the same content from this repetition on; 0: never */
 } pfl_sensor_t;
 
-/* How offspring are chosen; all four are unbiased and exact in integers. Systematic is the cheapest and as accurate as
- * any; with multinomial the same error costs up to half as much again (measured: docs/tuning.md). */
-typedef enum {
-    PFL_RESAMPLE_SYSTEMATIC = 0, /* one random number, evenly spaced points (Kitagawa 1996); O(N) */
-    PFL_RESAMPLE_STRATIFIED = 1, /* one random number in each of N strata (Kitagawa 1996); O(N) */
-    PFL_RESAMPLE_RESIDUAL = 2,   /* floor(N w) copies, the rest multinomial (Liu and Chen 1998); O(N log N) */
-    PFL_RESAMPLE_MULTINOMIAL = 3 /* N independent draws (Gordon, Salmond and Smith 1993); O(N log N) */
-} pfl_resampling_t;
-
 /* Which moments are computed after each update. */
 typedef enum {
     PFL_MOMENTS_FULL = 0, /* weighted mean and covariance */
@@ -127,6 +118,19 @@ typedef enum {
 
 /* A filter; it lives at the front of its arena. */
 typedef struct pfl pfl_t;
+
+/* How offspring are chosen; all four are unbiased and exact in integers. Systematic is the cheapest and as accurate as
+ * any; with multinomial the same error costs up to half as much again (measured: docs/tuning.md). */
+typedef void (*pfl_scheme_fn)(pfl_t *f);
+
+/* Not to be called, but to be named in pfl_config_t.resampling: so the linker takes along only what a filter uses. */
+void pfl_systematic(pfl_t *f);  /* one random number, evenly spaced points (Kitagawa 1996); O(N) */
+void pfl_stratified(pfl_t *f);  /* one random number in each of N strata (Kitagawa 1996); O(N) */
+void pfl_residual(pfl_t *f);    /* floor(N w) copies, the rest multinomial (Liu and Chen 1998); O(N log N) */
+void pfl_multinomial(pfl_t *f); /* N independent draws (Gordon, Salmond and Smith 1993); O(N log N) */
+
+/* Averages angles on the circle. To be named in pfl_config_t.circular, as above. */
+void pfl_circular_means(pfl_t *f, uint32_t first, uint32_t n);
 
 /* inside[i] <- 1 where particle i is allowed, 0 where not. Pure; writes inside[0 .. n-1] only. */
 typedef void (*pfl_inside_fn)(void *user, const pfl_view_t *particles, uint32_t *inside);
@@ -196,26 +200,26 @@ typedef struct {
     uint16_t states;        /* D, 1 .. PFL_STATES_MAX */
     uint16_t noises;        /* Q, 0 .. PFL_NOISES_MAX */
     uint16_t sensor_count;  /* 0 .. PFL_SENSORS_MAX */
-    uint16_t resampling;    /* pfl_resampling_t */
     uint16_t moments;       /* pfl_moments_t */
-    uint16_t reserved;      /* 0 */
-    uint32_t circular_mask; /* bit d set: state d is an angle in rad, averaged on the circle. Wrapped in estimates,
-                                never in the particles */
+    uint32_t circular_mask; /* bit d set: state d is an angle in rad, averaged on the circle: needs `circular`. Wrapped
+                                in estimates, never in the particles */
     float ess_ratio;        /* resample when the effective sample size < ess_ratio N; 0: never, 1: always; 0.5 usual */
     uint64_t seed;          /* any value; the same seed replays the same run */
     uint32_t
         dt_max_us; /* longest model step; a longer one is cut into up to PFL_SUBSTEPS_MAX; 0: no limit but 2^32 us, 71 minutes */
-    uint32_t budget_cycles; /* of the port's counter, for one filter cycle; 0: no budget */
-    const float *lo, *hi;   /* state box: D floats each, lo < hi, infinities allowed; both null: no box. Particles are
+    uint32_t budget_cycles;   /* of the port's counter, for one filter cycle; 0: no budget */
+    const float *lo, *hi;     /* state box: D floats each, lo < hi, infinities allowed; both null: no box. Particles are
                                 clipped to it after each predict */
-    const pfl_sensor_t *sensors;        /* sensor_count of them */
-    const pfl_constraint_t *constraint; /* null: none */
-    const pfl_kernel_t *kernel;         /* null: none */
-    const pfl_watch_t *watch;           /* null: no phase is judged */
-    pfl_predict_fn predict;             /* not null */
-    pfl_draw_fn draw;                   /* null: pfl_init starts all particles at zero, and pfl_reset answers
+    pfl_scheme_fn resampling; /* null: pfl_systematic */
+    void (*circular)(pfl_t *f, uint32_t first, uint32_t n); /* pfl_circular_means; may be null without angles */
+    const pfl_sensor_t *sensors;                            /* sensor_count of them */
+    const pfl_constraint_t *constraint;                     /* null: none */
+    const pfl_kernel_t *kernel;                             /* null: none */
+    const pfl_watch_t *watch;                               /* null: no phase is judged */
+    pfl_predict_fn predict;                                 /* not null */
+    pfl_draw_fn draw; /* null: pfl_init starts all particles at zero, and pfl_reset answers
                                     PFL_ERR_NO_DRAW */
-    void *user;                         /* handed to predict and draw */
+    void *user;       /* handed to predict and draw */
 } pfl_config_t;
 
 /* ---- A filter's life ---------------------------------------------------------------------------------------- */
@@ -259,7 +263,7 @@ pfl_status_t pfl_predict(pfl_t *f, uint64_t t_us, const void *u);
 pfl_status_t pfl_update(pfl_t *f, uint16_t sensor, uint64_t t_us, const void *z);
 
 /* Resamples now, whatever the effective sample size, by the configured scheme: equal weights afterwards. The cached
- * estimate stays the one before. PFL_OK, PFL_ERR_BUSY, PFL_ERR_ARG, PFL_ERR_CORRUPT. O(N D), see pfl_resampling_t. */
+ * estimate stays the one before. PFL_OK, PFL_ERR_BUSY, PFL_ERR_ARG, PFL_ERR_CORRUPT. O(N D), see pfl_scheme_fn. */
 pfl_status_t pfl_resample(pfl_t *f);
 
 /* ---- Answers ------------------------------------------------------------------------------------------------ */

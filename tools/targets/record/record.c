@@ -289,6 +289,18 @@ static void put_extras(void)
     }
 }
 
+/* The scheme as a number: read_config in replay/play_filter.c has the same order. */
+static uint32_t scheme_number(void)
+{
+    static const pfl_scheme_fn others[] = {pfl_stratified, pfl_residual, pfl_multinomial};
+    for (uint32_t k = 0u; k < 3u; k++) {
+        if (config.resampling == others[k]) {
+            return k + 1u;
+        }
+    }
+    return 0u;
+}
+
 static void put_config(uint64_t t_us)
 {
     put((uint32_t)TAPE_INIT);
@@ -296,7 +308,7 @@ static void put_config(uint64_t t_us)
     put(config.states);
     put(config.noises);
     put(config.sensor_count);
-    put(config.resampling);
+    put(scheme_number());
     put(config.moments);
     put(config.circular_mask);
     put_float(config.ess_ratio);

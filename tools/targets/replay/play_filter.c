@@ -116,15 +116,17 @@ static bool read_extras(void)
 
 static bool read_config(const play_t *p)
 {
+    static const pfl_scheme_fn schemes[] = {pfl_systematic, pfl_stratified, pfl_residual, pfl_multinomial};
     memset(&config, 0, sizeof config);
     config.abi = PFL_ABI;
     config.particles = words_next();
     config.states = (uint16_t)words_next();
     config.noises = (uint16_t)words_next();
     config.sensor_count = (uint16_t)words_next();
-    config.resampling = (uint16_t)words_next();
+    config.resampling = schemes[words_next() & 3u];
     config.moments = (uint16_t)words_next();
     config.circular_mask = words_next();
+    config.circular = pfl_circular_means;
     config.ess_ratio = words_next_float();
     config.seed = words_next_u64();
     config.dt_max_us = words_next();
