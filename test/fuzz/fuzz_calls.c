@@ -682,6 +682,20 @@ static bool is_weight(const pfl_t *f, const unsigned char *byte)
     return (byte >= (const unsigned char *)first) && (byte < (const unsigned char *)end);
 }
 
+/* Anywhere, or the bit of a particle that turns what lies between 1 and 2 into what is not finite. */
+static void flip_unguarded(slot_t *s, size_t at, uint8_t how)
+{
+    const size_t first = offsetof(struct pfl, rng);
+    const size_t numbers = (size_t)s->f->stride * s->f->config->states;
+    const bool number = (how & 16u) != 0u;
+    unsigned char *byte = number ? ((unsigned char *)&s->f->x[at % numbers] + 3)
+                                 : ((unsigned char *)s->arena + first + (at % (s->bytes - first)));
+    if (FLIP_WEIGHTS || !is_weight(s->f, byte)) {
+        *byte ^= (unsigned char)(number ? 0x40u : (1u << (how & 7u)));
+        s->worn = true;
+    }
+}
+
 static pfl_status_t do_flip(slot_t *s)
 {
     const uint8_t how = take_u8(&world.in);
@@ -689,12 +703,10 @@ static pfl_status_t do_flip(slot_t *s)
     if (((how & 64u) != 0u) && !s->worn) {
         flip_guarded(s, at % offsetof(struct pfl, rng), how);
     } else {
-        const size_t first = offsetof(struct pfl, rng);
-        unsigned char *byte = (unsigned char *)s->arena + first + (at % (s->bytes - first));
-        if (FLIP_WEIGHTS || !is_weight(s->f, byte)) {
-            *byte ^= (unsigned char)(1u << (how & 7u));
-            s->worn = true;
-        }
+        flip_unguarded(s, at, how);
+    }
+    if (((how & 32u) != 0u) && s->worn) {
+        return do_scrub(s);
     }
     return pfl_health(s->f, &(pfl_health_t){0});
 }
