@@ -75,6 +75,24 @@ static const unsigned char *get_floats(const unsigned char *at, float *x, size_t
     return at;
 }
 
+static float get_float(const unsigned char *at)
+{
+    return pfl_from_bits((int32_t)get_word(at));
+}
+
+static const unsigned char *get_streams(const unsigned char *at, pfl_rng_t *rng)
+{
+    for (uint32_t k = 0u; k < (4u * PFL_RNG_LANES); k++) {
+        rng->s[k / PFL_RNG_LANES][k % PFL_RNG_LANES] = get_word(at);
+        at += 4;
+    }
+    for (uint32_t k = 0u; k < 4u; k++) {
+        rng->one[k] = get_word(at);
+        at += 4;
+    }
+    return at;
+}
+
 static void head_of(const pfl_t *f, uint32_t head[HEAD_WORDS])
 {
     const uint32_t words[HEAD_WORDS] = {SNAPSHOT_MAGIC,
@@ -184,68 +202,72 @@ pfl_status_t pfl_snapshot(const pfl_t *f, void *buffer, size_t buffer_bytes)
 
 /* ---- Restore -------------------------------------------------------------------------------------------------- */
 
+static bool shape_fits(const pfl_t *f, const unsigned char *at)
+{
+    return (get_word(at) == SNAPSHOT_MAGIC) && (get_word(at + 4) == SNAPSHOT_VERSION) &&
+           (get_word(at + 8) == f->config->particles) && (get_word(at + 12) == f->config->states) &&
+           (get_word(at + 16) == f->config->noises) && (get_word(at + (4 * 24)) == f->config->moments);
+}
+
+static bool numbers_fit(const pfl_t *f, const unsigned char *at)
+{
+    const float sum = get_float(at + (4 * 12));
+    const float ess = get_float(at + (4 * 14));
+    return pfl_is_finite(get_float(at + (4 * 11))) && pfl_is_finite(sum) && (sum > 0.0f) &&
+           pfl_is_finite(get_float(at + (4 * 13))) && (ess >= 1.0f) && (ess <= (float)f->config->particles) &&
+           (get_word(at + (4 * 15)) <= MOMENTS_OVERFLOWED) && (get_word(at + (4 * 16)) <= 1u) &&
+           (get_word(at + (4 * 27)) < f->config->particles);
+}
+
 static bool watch_fits(const pfl_t *f, const unsigned char *at)
 {
     return (get_word(at + (4 * 29)) == tracked(f)) && (get_word(at + (4 * 32)) <= (uint32_t)PFL_PHASE_SETTLING) &&
-           pfl_is_finite(pfl_from_bits((int32_t)get_word(at + (4 * 41)))) &&
-           pfl_is_finite(pfl_from_bits((int32_t)get_word(at + (4 * 42))));
+           pfl_is_finite(get_float(at + (4 * 41))) && pfl_is_finite(get_float(at + (4 * 42)));
 }
 
 static bool tracks_are_good(const pfl_t *f, const unsigned char *at)
 {
-    bool good = true;
     for (size_t k = 0u; k < tracked(f); k++) {
-        good = good && pfl_is_finite(pfl_from_bits((int32_t)get_word(at + (4u * ((k * TRACK_WORDS) + 2u)))));
+        if (!pfl_is_finite(get_float(at + (4u * ((k * TRACK_WORDS) + 2u))))) {
+            return false;
+        }
     }
-    return good;
+    return true;
 }
 
-static bool head_fits(const pfl_t *f, const unsigned char *at)
+static bool floats_are_finite(const unsigned char *at, size_t n)
 {
-    const float top = pfl_from_bits((int32_t)get_word(at + (4 * 11)));
-    const float sum = pfl_from_bits((int32_t)get_word(at + (4 * 12)));
-    const float ratio = pfl_from_bits((int32_t)get_word(at + (4 * 13)));
-    const float ess = pfl_from_bits((int32_t)get_word(at + (4 * 14)));
-    const bool shape = (get_word(at) == SNAPSHOT_MAGIC) && (get_word(at + 4) == SNAPSHOT_VERSION) &&
-                       (get_word(at + 8) == f->config->particles) && (get_word(at + 12) == f->config->states) &&
-                       (get_word(at + 16) == f->config->noises) && (get_word(at + (4 * 24)) == f->config->moments);
-    const bool numbers = pfl_is_finite(top) && pfl_is_finite(sum) && pfl_is_finite(ratio) && pfl_is_finite(ess);
-    return shape && numbers && (sum > 0.0f) && (ess >= 1.0f) && (ess <= (float)f->config->particles) &&
-           (get_word(at + (4 * 15)) <= MOMENTS_OVERFLOWED) && (get_word(at + (4 * 16)) <= 1u) &&
-           (get_word(at + (4 * 27)) < f->config->particles) && watch_fits(f, at);
+    for (size_t k = 0u; k < n; k++) {
+        if (!pfl_is_finite(get_float(at + (4u * k)))) {
+            return false;
+        }
+    }
+    return true;
 }
 
-/* Streams alive, moments and states finite, log-weights not above their top, and one that reaches it: without it all
- * weights could be zero, and so could their sum. */
+/* None above their top, and one that reaches it: without it all weights could be zero, and so could their sum. */
+static bool log_weights_fit(const unsigned char *at, uint32_t n, float top)
+{
+    bool reached = false;
+    for (size_t i = 0u; i < n; i++) {
+        const float relative = get_float(at + (4u * i)) - top;
+        if (!(relative <= 0.0f)) {
+            return false;
+        }
+        reached = reached || (relative >= 0.0f);
+    }
+    return reached;
+}
+
 static bool body_is_good(const pfl_t *f, const unsigned char *at)
 {
-    const float top = pfl_from_bits((int32_t)get_word(at + (4 * 11)));
     const size_t states = f->config->states;
     const size_t finite = moment_words(states) + (states * f->config->particles);
-    const unsigned char *next = at + (4u * HEAD_WORDS);
-    bool good = tracks_are_good(f, next);
-    next += 4u * TRACK_WORDS * tracked(f);
+    const unsigned char *tracks = at + (4u * HEAD_WORDS);
     pfl_rng_t rng;
-    for (uint32_t k = 0u; k < (4u * PFL_RNG_LANES); k++) {
-        rng.s[k / PFL_RNG_LANES][k % PFL_RNG_LANES] = get_word(next + (4u * k));
-    }
-    for (uint32_t k = 0u; k < 4u; k++) {
-        rng.one[k] = get_word(next + (4u * ((4u * PFL_RNG_LANES) + k)));
-    }
-    good = good && pfl_rng_alive(&rng);
-    next += 4u * RNG_WORDS;
-    for (size_t k = 0u; k < finite; k++) {
-        good = good && pfl_is_finite(pfl_from_bits((int32_t)get_word(next)));
-        next += 4;
-    }
-    bool reached = false;
-    for (uint32_t i = 0u; i < f->config->particles; i++) {
-        const float relative = pfl_from_bits((int32_t)get_word(next)) - top;
-        good = good && pfl_is_not_nan(relative) && (relative <= 0.0f);
-        reached = reached || (relative >= 0.0f);
-        next += 4;
-    }
-    return good && reached;
+    const unsigned char *floats = get_streams(tracks + (4u * TRACK_WORDS * tracked(f)), &rng);
+    return tracks_are_good(f, tracks) && pfl_rng_alive(&rng) && floats_are_finite(floats, finite) &&
+           log_weights_fit(floats + (4u * finite), f->config->particles, get_float(at + (4 * 11)));
 }
 
 static uint64_t get_time(const unsigned char *at)
@@ -285,8 +307,8 @@ static void take_head(pfl_t *f, const unsigned char *at)
     f->watched.lean = get_word(at + (4 * 38));
     f->watched.settled = get_word(at + (4 * 39));
     f->watched.quarantined = get_word(at + (4 * 40));
-    f->watched.best_loglik = pfl_from_bits((int32_t)get_word(at + (4 * 41)));
-    f->watched.ratio_before = pfl_from_bits((int32_t)get_word(at + (4 * 42)));
+    f->watched.best_loglik = get_float(at + (4 * 41));
+    f->watched.ratio_before = get_float(at + (4 * 42));
     f->scratch_is_weights = 0u;
 }
 
@@ -295,7 +317,7 @@ static const unsigned char *take_tracks(pfl_t *f, const unsigned char *at)
     for (size_t k = 0u; k < tracked(f); k++) {
         pfl_sensor_track_t *track = &f->sensor[k];
         track->t_fused_us = get_time(at);
-        track->test_ratio = pfl_from_bits((int32_t)get_word(at + 8));
+        track->test_ratio = get_float(at + 8);
         track->refused = get_word(at + 12);
         track->content = get_word(at + 16);
         track->same = get_word(at + 20) >> 1;
@@ -312,19 +334,14 @@ static pfl_status_t restore(pfl_t *f, const void *buffer, size_t buffer_bytes)
     }
     const unsigned char *at = (const unsigned char *)buffer;
     const size_t bytes = pfl_snapshot_bytes(f);
-    if ((buffer_bytes < bytes) || !head_fits(f, at) || (get_word(at + (bytes - 4u)) != crc32(at, bytes - 4u)) ||
-        !body_is_good(f, at)) {
+    if ((buffer_bytes < bytes) || !shape_fits(f, at) || !numbers_fit(f, at) || !watch_fits(f, at) ||
+        (get_word(at + (bytes - 4u)) != crc32(at, bytes - 4u)) || !body_is_good(f, at)) {
         return PFL_ERR_CORRUPT;
     }
     const size_t states = f->config->states;
     take_head(f, at);
     at = take_tracks(f, at + (4u * HEAD_WORDS));
-    for (uint32_t k = 0u; k < RNG_WORDS; k++) {
-        uint32_t *word = (k < (4u * PFL_RNG_LANES)) ? &f->rng.s[k / PFL_RNG_LANES][k % PFL_RNG_LANES]
-                                                    : &f->rng.one[k - (4u * PFL_RNG_LANES)];
-        *word = get_word(at);
-        at += 4;
-    }
+    at = get_streams(at, &f->rng);
     at = get_floats(at, f->mean, moment_words(states));
     for (size_t d = 0u; d < states; d++) {
         at = get_floats(at, &f->x[d * f->stride], f->config->particles);
