@@ -109,11 +109,17 @@ static void scatter(void *user, const pfl_batch_t *p)
     }
 }
 
+/* For the hash: nothing, where all is well. */
+static uint64_t failure(pfl_status_t status)
+{
+    return (status == PFL_OK) ? 0u : 1u;
+}
+
 PFL_NOINLINE static void mix_answers(pfl_t *f, uint64_t *hash)
 {
     float mean[2] = {0.0f, 0.0f};
     float cov[4] = {0.0f, 0.0f, 0.0f, 0.0f};
-    *hash ^= (uint64_t)(pfl_estimate(f, mean, cov) != PFL_OK);
+    *hash ^= failure(pfl_estimate(f, mean, cov));
     mix(hash, mean[0]);
     mix(hash, mean[1]);
     mix(hash, cov[0]);
@@ -143,11 +149,12 @@ PFL_NOINLINE static void fly(void *arena, pfl_resampling_t scheme, uint64_t *has
     config->predict = drift;
     config->draw = scatter;
     pfl_t *f = NULL;
-    uint64_t failed = (uint64_t)(pfl_init(arena, arena_bytes, config, 0u, &f) != PFL_OK);
+    uint64_t failed = failure(pfl_init(arena, arena_bytes, config, 0u, &f));
     for (uint32_t k = 1u; k <= SELF_TEST_STEPS; k++) {
+        const uint64_t t_us = (uint64_t)k * 250000u;
         const float z = 3.0f + (0.125f * (float)k);
-        failed |= (uint64_t)(pfl_predict(f, k * 250000u, NULL) != PFL_OK);
-        failed |= (uint64_t)(pfl_update(f, 0u, k * 250000u, &z) != PFL_OK);
+        failed |= failure(pfl_predict(f, t_us, NULL));
+        failed |= failure(pfl_update(f, 0u, t_us, &z));
         mix_answers(f, hash);
     }
     *hash ^= failed;
