@@ -5,8 +5,8 @@
 static void mirror(const float *restrict half, uint32_t n, float *restrict noise)
 {
     for (uint32_t i = 0u; i < (n / 2u); i++) {
-        noise[2u * i] = half[i];
-        noise[(2u * i) + 1u] = -half[i];
+        noise[(size_t)2u * i] = half[i];
+        noise[((size_t)2u * i) + 1u] = -half[i];
     }
     if ((n & 1u) != 0u) { /* without a partner */
         noise[n - 1u] = half[n / 2u];
@@ -22,7 +22,7 @@ void pfl_antithetic_predict(void *user, const void *u, float dt_s, const pfl_bat
     for (uint32_t q = 0u; q < noises; q++) {
         /* With n odd the halves share the normal in the middle, for different particles. */
         const float *column = PFL_NOISE(p, q / 2u);
-        mirror(((q & 1u) == 0u) ? column : &column[p->n / 2u], p->n, &noise[q * PFL_BATCH]);
+        mirror(((q & 1u) == 0u) ? column : &column[p->n / 2u], p->n, &noise[(size_t)q * PFL_BATCH]);
     }
     m->predict(m->user, u, dt_s, &mirrored);
 }

@@ -33,44 +33,60 @@ static bool box_is_good(const pfl_config_t *c)
     return true;
 }
 
+/* NaN is none. */
+static bool is_share(float x)
+{
+    return (x >= 0.0f) && (x <= 1.0f);
+}
+
+static bool deviations_are_good(const pfl_config_t *c)
+{
+    const float *ok_sigma = c->watch->ok_sigma;
+    for (uint32_t d = 0u; (ok_sigma != NULL) && (d < c->states); d++) {
+        if (!(ok_sigma[d] > 0.0f)) {
+            return false;
+        }
+    }
+    return (ok_sigma == NULL) || (c->moments == (uint16_t)PFL_MOMENTS_FULL);
+}
+
 static bool watch_is_good(const pfl_config_t *c)
 {
     const pfl_watch_t *w = c->watch;
-    if (w == NULL) {
-        return true;
-    }
-    bool good = (w->keep != NULL) && pfl_is_finite(w->lean_ratio) && (w->lean_ratio >= 0.0f) &&
-                (w->lean_ratio <= 1.0f) && pfl_is_finite(w->reinject) && (w->reinject >= 0.0f) &&
-                (w->reinject <= 1.0f) && ((w->ok_sigma == NULL) || (c->moments == (uint16_t)PFL_MOMENTS_FULL));
-    for (uint32_t d = 0u; (w->ok_sigma != NULL) && (d < c->states); d++) {
-        good = good && pfl_is_not_nan(w->ok_sigma[d]) && (w->ok_sigma[d] > 0.0f);
-    }
-    return good;
+    return (w == NULL) ||
+           ((w->keep != NULL) && is_share(w->lean_ratio) && is_share(w->reinject) && deviations_are_good(c));
 }
 
-static bool options_are_good(const pfl_config_t *c)
+static bool constraint_is_good(const pfl_config_t *c)
 {
     const pfl_constraint_t *k = c->constraint;
-    const pfl_kernel_t *kernel = c->kernel;
-    const bool constraint = (k == NULL) || ((k->inside != NULL) && (k->project != NULL) && (k->keep != NULL) &&
-                                            (k->tries >= 1u) && (k->tries <= PFL_TRIES_MAX));
-    const bool jitter = (kernel == NULL) || ((kernel->move != NULL) && (c->moments == (uint16_t)PFL_MOMENTS_FULL) &&
-                                             pfl_is_finite(kernel->width) && (kernel->width > 0.0f) &&
-                                             (kernel->width < 1.0f) && ((kernel->states_mask >> c->states) == 0u));
-    return constraint && jitter && watch_is_good(c);
+    return (k == NULL) || ((k->inside != NULL) && (k->project != NULL) && (k->keep != NULL) && (k->tries >= 1u) &&
+                           (k->tries <= PFL_TRIES_MAX));
+}
+
+static bool kernel_is_good(const pfl_config_t *c)
+{
+    const pfl_kernel_t *k = c->kernel;
+    return (k == NULL) || ((k->move != NULL) && (c->moments == (uint16_t)PFL_MOMENTS_FULL) && (k->width > 0.0f) &&
+                           (k->width < 1.0f) && ((k->states_mask >> c->states) == 0u));
+}
+
+static bool sizes_are_good(const pfl_config_t *c)
+{
+    return (c->particles >= 1u) && (c->particles <= PFL_PARTICLES_MAX) && (c->states >= 1u) &&
+           (c->states <= PFL_STATES_MAX) && (c->noises <= PFL_NOISES_MAX);
+}
+
+static bool choices_are_good(const pfl_config_t *c)
+{
+    return (c->moments <= (uint16_t)PFL_MOMENTS_MEAN) && ((c->circular_mask >> c->states) == 0u) &&
+           ((c->circular_mask == 0u) || (c->circular != NULL)) && is_share(c->ess_ratio);
 }
 
 bool pfl_config_is_good(const pfl_config_t *c)
 {
-    const bool sizes = (c->particles >= 1u) && (c->particles <= PFL_PARTICLES_MAX) && (c->states >= 1u) &&
-                       (c->states <= PFL_STATES_MAX) && (c->noises <= PFL_NOISES_MAX);
-    if (!sizes || (c->predict == NULL)) {
-        return false;
-    }
-    const bool choices = (c->moments <= (uint16_t)PFL_MOMENTS_MEAN) && ((c->circular_mask >> c->states) == 0u) &&
-                         ((c->circular_mask == 0u) || (c->circular != NULL));
-    const bool ratio = pfl_is_finite(c->ess_ratio) && (c->ess_ratio >= 0.0f) && (c->ess_ratio <= 1.0f);
-    return choices && ratio && sensors_are_good(c) && box_is_good(c) && options_are_good(c);
+    return sizes_are_good(c) && (c->predict != NULL) && choices_are_good(c) &&
+           sensors_are_good(c) && box_is_good(c) && constraint_is_good(c) && kernel_is_good(c) && watch_is_good(c);
 }
 
 size_t pfl_arena_bytes(const pfl_config_t *config)

@@ -72,15 +72,8 @@ pfl_status_t pfl_particles(const pfl_t *f, pfl_view_t *view, float *log_weights)
     return PFL_OK;
 }
 
-pfl_status_t pfl_farthest(const pfl_t *f, uint16_t x_state, uint16_t y_state, float x, float y, float *distance)
+static float farthest_square(const pfl_t *f, uint32_t x_state, uint32_t y_state, float x, float y)
 {
-    const pfl_status_t looked = (distance != NULL) ? pfl_look(f) : PFL_ERR_ARG;
-    if (looked != PFL_OK) {
-        return looked;
-    }
-    if ((x_state >= f->config->states) || (y_state >= f->config->states) || !pfl_is_finite(x) || !pfl_is_finite(y)) {
-        return PFL_ERR_ARG;
-    }
     const float *restrict px = &f->x[(size_t)x_state * f->stride];
     const float *restrict py = &f->x[(size_t)y_state * f->stride];
     float farthest = 0.0f;
@@ -90,6 +83,19 @@ pfl_status_t pfl_farthest(const pfl_t *f, uint16_t x_state, uint16_t y_state, fl
         const float square = (dx * dx) + (dy * dy);
         farthest = (square > farthest) ? square : farthest;
     }
+    return farthest;
+}
+
+pfl_status_t pfl_farthest(const pfl_t *f, uint16_t x_state, uint16_t y_state, float x, float y, float *distance)
+{
+    const pfl_status_t looked = (distance != NULL) ? pfl_look(f) : PFL_ERR_ARG;
+    if (looked != PFL_OK) {
+        return looked;
+    }
+    if ((x_state >= f->config->states) || (y_state >= f->config->states) || !pfl_is_finite(x) || !pfl_is_finite(y)) {
+        return PFL_ERR_ARG;
+    }
+    const float farthest = farthest_square(f, x_state, y_state, x, y);
     *distance = pfl_is_finite(farthest) ? pfl_sqrt_kernel(farthest) : FLT_MAX;
     return PFL_OK;
 }
@@ -155,25 +161,44 @@ pfl_status_t pfl_quantile(pfl_t *f, uint16_t state, float p, float *value)
 
 /* ---- Invariants ------------------------------------------------------------------------------------------------ */
 
+static bool block_is_sane(const pfl_t *f)
+{
+    const uint32_t count = f->config->particles;
+    return (f->stride == PFL_STRIDE(count)) && pfl_rng_alive(&f->rng) && (f->busy == 0u) &&
+           pfl_is_finite(f->log_weight_top) && (f->ess >= 1.0f) && (f->ess <= (float)count);
+}
+
+static bool particles_are_finite(const pfl_t *f)
+{
+    for (uint32_t d = 0u; d < f->config->states; d++) {
+        const float *x = &f->x[(size_t)d * f->stride];
+        for (uint32_t i = 0u; i < f->config->particles; i++) {
+            if (!pfl_is_finite(x[i])) {
+                return false;
+            }
+        }
+    }
+    return true;
+}
+
+/* None is NaN or above the top, and one reaches it: else all weights could be zero. */
+static bool log_weights_are_sane(const pfl_t *f)
+{
+    bool reached = f->weights_equal != 0u;
+    for (uint32_t i = 0u; (f->weights_equal == 0u) && (i < f->config->particles); i++) {
+        const float relative = f->log_weight[i] - f->log_weight_top;
+        if (!(relative <= 0.0f)) {
+            return false;
+        }
+        reached = reached || (relative >= 0.0f);
+    }
+    return reached;
+}
+
 bool pfl_invariants_hold(const pfl_t *f)
 {
     if ((pfl_look(f) != PFL_OK) || !pfl_config_is_good(f->config)) {
         return false;
     }
-    const uint32_t count = f->config->particles;
-    bool hold = (f->stride == PFL_STRIDE(count)) && pfl_rng_alive(&f->rng) && (f->busy == 0u) &&
-                pfl_is_finite(f->log_weight_top) && (f->ess >= 1.0f) && (f->ess <= (float)count);
-    for (uint32_t d = 0u; d < f->config->states; d++) {
-        const float *x = &f->x[(size_t)d * f->stride];
-        for (uint32_t i = 0u; i < count; i++) {
-            hold = hold && pfl_is_finite(x[i]);
-        }
-    }
-    bool reached = f->weights_equal != 0u; /* the top, by a log-weight: else all weights could be zero */
-    for (uint32_t i = 0u; (f->weights_equal == 0u) && (i < count); i++) {
-        const float relative = f->log_weight[i] - f->log_weight_top;
-        hold = hold && pfl_is_not_nan(relative) && (relative <= 0.0f);
-        reached = reached || (relative >= 0.0f);
-    }
-    return hold && reached;
+    return block_is_sane(f) && particles_are_finite(f) && log_weights_are_sane(f);
 }

@@ -158,6 +158,19 @@ PFL_NOINLINE static pfl_status_t weigh(pfl_t *f, const pfl_sensor_t *sensor, con
     return PFL_OK;
 }
 
+/* Of the best log-likelihood to the gate: 0 for a match better than perfect, finite for an impossible one. */
+static float ratio_of(const pfl_sensor_t *sensor, float best)
+{
+    if (!(sensor->gate > 0.0f)) {
+        return 0.0f;
+    }
+    const float ratio = (-2.0f * best) / sensor->gate;
+    if (!pfl_is_finite(ratio)) {
+        return FLT_MAX;
+    }
+    return (ratio > 0.0f) ? ratio : 0.0f;
+}
+
 /* Judges what the sensor said of the particles. */
 PFL_NOINLINE static pfl_status_t judge(pfl_t *f, const pfl_sensor_t *sensor, const pfl_weigh_t *w)
 {
@@ -170,16 +183,8 @@ PFL_NOINLINE static pfl_status_t judge(pfl_t *f, const pfl_sensor_t *sensor, con
     if (w->gated != 0u) {
         f->watched.best_loglik = pfl_is_finite(best) ? best : -FLT_MAX;
     }
-    if (sensor->gate > 0.0f) {
-        const float ratio = (-2.0f * best) / sensor->gate;
-        f->test_ratio = pfl_is_finite(ratio) ? ((ratio > 0.0f) ? ratio : 0.0f) : FLT_MAX;
-    } else {
-        f->test_ratio = 0.0f;
-    }
-    if ((f->test_ratio > 1.0f) || (w->top_bits >= minus_infinity)) {
-        return PFL_REJECTED;
-    }
-    return PFL_OK;
+    f->test_ratio = ratio_of(sensor, best);
+    return ((f->test_ratio > 1.0f) || (w->top_bits >= minus_infinity)) ? PFL_REJECTED : PFL_OK;
 }
 
 /* The new log-weights become the filter's: an exchange of two columns, and nothing can fail any more. */

@@ -9,8 +9,8 @@
 
 #define SNAPSHOT_MAGIC 0x73706670u /* "pfps" */
 #define SNAPSHOT_VERSION 2u
-#define HEAD_WORDS 43u
-#define TRACK_WORDS 6u
+#define HEAD_WORDS ((size_t)43)
+#define TRACK_WORDS ((size_t)6)
 #define RNG_WORDS ((4u * PFL_RNG_LANES) + 4u)
 
 /* From `mean` on: mean, best, centre, delta and covariance lie end to end (pfl_lay_out). */
@@ -70,6 +70,35 @@ static const unsigned char *get_floats(const unsigned char *at, float *x, size_t
 {
     for (size_t i = 0u; i < n; i++) {
         pfl_store_u32(&x[i], get_word(at));
+        at += 4;
+    }
+    return at;
+}
+
+/* Word k of what begins at `at`. */
+static uint32_t word_at(const unsigned char *at, size_t k)
+{
+    return get_word(&at[4u * k]);
+}
+
+static float float_at(const unsigned char *at, size_t k)
+{
+    return pfl_from_bits((int32_t)word_at(at, k));
+}
+
+static uint64_t time_at(const unsigned char *at, size_t k)
+{
+    return (uint64_t)word_at(at, k) | ((uint64_t)word_at(at, k + 1u) << 32);
+}
+
+static const unsigned char *get_streams(const unsigned char *at, pfl_rng_t *rng)
+{
+    for (uint32_t k = 0u; k < (4u * PFL_RNG_LANES); k++) {
+        rng->s[k / PFL_RNG_LANES][k % PFL_RNG_LANES] = get_word(at);
+        at += 4;
+    }
+    for (uint32_t k = 0u; k < 4u; k++) {
+        rng->one[k] = get_word(at);
         at += 4;
     }
     return at;
@@ -160,7 +189,7 @@ pfl_status_t pfl_snapshot(const pfl_t *f, void *buffer, size_t buffer_bytes)
     uint32_t head[HEAD_WORDS];
     head_of(f, head);
     unsigned char *at = (unsigned char *)buffer;
-    for (uint32_t k = 0u; k < HEAD_WORDS; k++) {
+    for (size_t k = 0u; k < HEAD_WORDS; k++) {
         put_word(at, head[k]);
         at += 4;
     }
@@ -184,109 +213,107 @@ pfl_status_t pfl_snapshot(const pfl_t *f, void *buffer, size_t buffer_bytes)
 
 /* ---- Restore -------------------------------------------------------------------------------------------------- */
 
+static bool shape_fits(const pfl_t *f, const unsigned char *at)
+{
+    return (word_at(at, 0) == SNAPSHOT_MAGIC) && (word_at(at, 1) == SNAPSHOT_VERSION) &&
+           (word_at(at, 2) == f->config->particles) && (word_at(at, 3) == f->config->states) &&
+           (word_at(at, 4) == f->config->noises) && (word_at(at, 24) == f->config->moments);
+}
+
+static bool numbers_fit(const pfl_t *f, const unsigned char *at)
+{
+    const float sum = float_at(at, 12);
+    const float ess = float_at(at, 14);
+    return pfl_is_finite(float_at(at, 11)) && pfl_is_finite(sum) && (sum > 0.0f) && pfl_is_finite(float_at(at, 13)) &&
+           (ess >= 1.0f) && (ess <= (float)f->config->particles) && (word_at(at, 15) <= MOMENTS_OVERFLOWED) &&
+           (word_at(at, 16) <= 1u) && (word_at(at, 27) < f->config->particles);
+}
+
 static bool watch_fits(const pfl_t *f, const unsigned char *at)
 {
-    return (get_word(at + (4 * 29)) == tracked(f)) && (get_word(at + (4 * 32)) <= (uint32_t)PFL_PHASE_SETTLING) &&
-           pfl_is_finite(pfl_from_bits((int32_t)get_word(at + (4 * 41)))) &&
-           pfl_is_finite(pfl_from_bits((int32_t)get_word(at + (4 * 42))));
+    return (word_at(at, 29) == tracked(f)) && (word_at(at, 32) <= (uint32_t)PFL_PHASE_SETTLING) &&
+           pfl_is_finite(float_at(at, 41)) && pfl_is_finite(float_at(at, 42));
 }
 
 static bool tracks_are_good(const pfl_t *f, const unsigned char *at)
 {
-    bool good = true;
     for (size_t k = 0u; k < tracked(f); k++) {
-        good = good && pfl_is_finite(pfl_from_bits((int32_t)get_word(at + (4u * ((k * TRACK_WORDS) + 2u)))));
+        if (!pfl_is_finite(float_at(at, (k * TRACK_WORDS) + 2u))) {
+            return false;
+        }
     }
-    return good;
+    return true;
 }
 
-static bool head_fits(const pfl_t *f, const unsigned char *at)
+static bool floats_are_finite(const unsigned char *at, size_t n)
 {
-    const float top = pfl_from_bits((int32_t)get_word(at + (4 * 11)));
-    const float sum = pfl_from_bits((int32_t)get_word(at + (4 * 12)));
-    const float ratio = pfl_from_bits((int32_t)get_word(at + (4 * 13)));
-    const float ess = pfl_from_bits((int32_t)get_word(at + (4 * 14)));
-    const bool shape = (get_word(at) == SNAPSHOT_MAGIC) && (get_word(at + 4) == SNAPSHOT_VERSION) &&
-                       (get_word(at + 8) == f->config->particles) && (get_word(at + 12) == f->config->states) &&
-                       (get_word(at + 16) == f->config->noises) && (get_word(at + (4 * 24)) == f->config->moments);
-    const bool numbers = pfl_is_finite(top) && pfl_is_finite(sum) && pfl_is_finite(ratio) && pfl_is_finite(ess);
-    return shape && numbers && (sum > 0.0f) && (ess >= 1.0f) && (ess <= (float)f->config->particles) &&
-           (get_word(at + (4 * 15)) <= MOMENTS_OVERFLOWED) && (get_word(at + (4 * 16)) <= 1u) &&
-           (get_word(at + (4 * 27)) < f->config->particles) && watch_fits(f, at);
+    for (size_t k = 0u; k < n; k++) {
+        if (!pfl_is_finite(float_at(at, k))) {
+            return false;
+        }
+    }
+    return true;
 }
 
-/* Streams alive, moments and states finite, log-weights not above their top, and one that reaches it: without it all
- * weights could be zero, and so could their sum. */
+/* None above their top, and one that reaches it: without it all weights could be zero, and so could their sum. */
+static bool log_weights_fit(const unsigned char *at, uint32_t n, float top)
+{
+    bool reached = false;
+    for (size_t i = 0u; i < n; i++) {
+        const float relative = float_at(at, i) - top;
+        if (!(relative <= 0.0f)) {
+            return false;
+        }
+        reached = reached || (relative >= 0.0f);
+    }
+    return reached;
+}
+
 static bool body_is_good(const pfl_t *f, const unsigned char *at)
 {
-    const float top = pfl_from_bits((int32_t)get_word(at + (4 * 11)));
     const size_t states = f->config->states;
     const size_t finite = moment_words(states) + (states * f->config->particles);
-    const unsigned char *next = at + (4u * HEAD_WORDS);
-    bool good = tracks_are_good(f, next);
-    next += 4u * TRACK_WORDS * tracked(f);
+    const unsigned char *tracks = at + (4u * HEAD_WORDS);
     pfl_rng_t rng;
-    for (uint32_t k = 0u; k < (4u * PFL_RNG_LANES); k++) {
-        rng.s[k / PFL_RNG_LANES][k % PFL_RNG_LANES] = get_word(next + (4u * k));
-    }
-    for (uint32_t k = 0u; k < 4u; k++) {
-        rng.one[k] = get_word(next + (4u * ((4u * PFL_RNG_LANES) + k)));
-    }
-    good = good && pfl_rng_alive(&rng);
-    next += 4u * RNG_WORDS;
-    for (size_t k = 0u; k < finite; k++) {
-        good = good && pfl_is_finite(pfl_from_bits((int32_t)get_word(next)));
-        next += 4;
-    }
-    bool reached = false;
-    for (uint32_t i = 0u; i < f->config->particles; i++) {
-        const float relative = pfl_from_bits((int32_t)get_word(next)) - top;
-        good = good && pfl_is_not_nan(relative) && (relative <= 0.0f);
-        reached = reached || (relative >= 0.0f);
-        next += 4;
-    }
-    return good && reached;
-}
-
-static uint64_t get_time(const unsigned char *at)
-{
-    return (uint64_t)get_word(at) | ((uint64_t)get_word(at + 4) << 32);
+    const unsigned char *floats = get_streams(tracks + (4u * TRACK_WORDS * tracked(f)), &rng);
+    return tracks_are_good(f, tracks) && pfl_rng_alive(&rng) && floats_are_finite(floats, finite) &&
+           log_weights_fit(floats + (4u * finite), f->config->particles, float_at(at, 11));
 }
 
 static void take_head(pfl_t *f, const unsigned char *at)
 {
-    f->t_us = get_time(at + (4 * 5));
-    f->reset_t_us = get_time(at + (4 * 7));
-    f->t_fused_us = get_time(at + (4 * 9));
-    f->log_weight_top = pfl_from_bits((int32_t)get_word(at + (4 * 11)));
-    f->weight_sum = pfl_from_bits((int32_t)get_word(at + (4 * 12)));
-    f->test_ratio = pfl_from_bits((int32_t)get_word(at + (4 * 13)));
-    f->ess = pfl_from_bits((int32_t)get_word(at + (4 * 14)));
-    f->moments_current = get_word(at + (4 * 15));
-    f->resample_pending = get_word(at + (4 * 16));
-    f->fused = get_word(at + (4 * 17));
-    f->rejected = get_word(at + (4 * 18));
-    f->faulted = get_word(at + (4 * 19));
-    f->resampled = get_word(at + (4 * 20));
-    f->quarantined = get_word(at + (4 * 21));
-    f->resets = get_word(at + (4 * 22));
-    f->overruns = get_word(at + (4 * 23));
-    f->redrawn = get_word(at + (4 * 25));
-    f->projected = get_word(at + (4 * 26));
-    f->best_index = get_word(at + (4 * 27));
-    f->mended = get_word(at + (4 * 28));
-    f->watched.since_us = get_time(at + (4 * 30));
-    f->watched.phase = get_word(at + (4 * 32));
-    f->watched.fault = get_word(at + (4 * 33));
-    f->watched.reject = get_word(at + (4 * 34));
-    f->watched.mode = get_word(at + (4 * 35));
-    f->watched.event = get_word(at + (4 * 36));
-    f->watched.refused = get_word(at + (4 * 37));
-    f->watched.lean = get_word(at + (4 * 38));
-    f->watched.settled = get_word(at + (4 * 39));
-    f->watched.quarantined = get_word(at + (4 * 40));
-    f->watched.best_loglik = pfl_from_bits((int32_t)get_word(at + (4 * 41)));
-    f->watched.ratio_before = pfl_from_bits((int32_t)get_word(at + (4 * 42)));
+    f->t_us = time_at(at, 5);
+    f->reset_t_us = time_at(at, 7);
+    f->t_fused_us = time_at(at, 9);
+    f->log_weight_top = float_at(at, 11);
+    f->weight_sum = float_at(at, 12);
+    f->test_ratio = float_at(at, 13);
+    f->ess = float_at(at, 14);
+    f->moments_current = word_at(at, 15);
+    f->resample_pending = word_at(at, 16);
+    f->fused = word_at(at, 17);
+    f->rejected = word_at(at, 18);
+    f->faulted = word_at(at, 19);
+    f->resampled = word_at(at, 20);
+    f->quarantined = word_at(at, 21);
+    f->resets = word_at(at, 22);
+    f->overruns = word_at(at, 23);
+    f->redrawn = word_at(at, 25);
+    f->projected = word_at(at, 26);
+    f->best_index = word_at(at, 27);
+    f->mended = word_at(at, 28);
+    f->watched.since_us = time_at(at, 30);
+    f->watched.phase = word_at(at, 32);
+    f->watched.fault = word_at(at, 33);
+    f->watched.reject = word_at(at, 34);
+    f->watched.mode = word_at(at, 35);
+    f->watched.event = word_at(at, 36);
+    f->watched.refused = word_at(at, 37);
+    f->watched.lean = word_at(at, 38);
+    f->watched.settled = word_at(at, 39);
+    f->watched.quarantined = word_at(at, 40);
+    f->watched.best_loglik = float_at(at, 41);
+    f->watched.ratio_before = float_at(at, 42);
     f->scratch_is_weights = 0u;
 }
 
@@ -294,12 +321,12 @@ static const unsigned char *take_tracks(pfl_t *f, const unsigned char *at)
 {
     for (size_t k = 0u; k < tracked(f); k++) {
         pfl_sensor_track_t *track = &f->sensor[k];
-        track->t_fused_us = get_time(at);
-        track->test_ratio = pfl_from_bits((int32_t)get_word(at + 8));
-        track->refused = get_word(at + 12);
-        track->content = get_word(at + 16);
-        track->same = get_word(at + 20) >> 1;
-        track->seen = get_word(at + 20) & 1u;
+        track->t_fused_us = time_at(at, 0);
+        track->test_ratio = float_at(at, 2);
+        track->refused = word_at(at, 3);
+        track->content = word_at(at, 4);
+        track->same = word_at(at, 5) >> 1;
+        track->seen = word_at(at, 5) & 1u;
         at += 4u * TRACK_WORDS;
     }
     return at;
@@ -312,19 +339,14 @@ static pfl_status_t restore(pfl_t *f, const void *buffer, size_t buffer_bytes)
     }
     const unsigned char *at = (const unsigned char *)buffer;
     const size_t bytes = pfl_snapshot_bytes(f);
-    if ((buffer_bytes < bytes) || !head_fits(f, at) || (get_word(at + (bytes - 4u)) != crc32(at, bytes - 4u)) ||
-        !body_is_good(f, at)) {
+    if ((buffer_bytes < bytes) || !shape_fits(f, at) || !numbers_fit(f, at) || !watch_fits(f, at) ||
+        (get_word(at + (bytes - 4u)) != crc32(at, bytes - 4u)) || !body_is_good(f, at)) {
         return PFL_ERR_CORRUPT;
     }
     const size_t states = f->config->states;
     take_head(f, at);
     at = take_tracks(f, at + (4u * HEAD_WORDS));
-    for (uint32_t k = 0u; k < RNG_WORDS; k++) {
-        uint32_t *word = (k < (4u * PFL_RNG_LANES)) ? &f->rng.s[k / PFL_RNG_LANES][k % PFL_RNG_LANES]
-                                                    : &f->rng.one[k - (4u * PFL_RNG_LANES)];
-        *word = get_word(at);
-        at += 4;
-    }
+    at = get_streams(at, &f->rng);
     at = get_floats(at, f->mean, moment_words(states));
     for (size_t d = 0u; d < states; d++) {
         at = get_floats(at, &f->x[d * f->stride], f->config->particles);

@@ -38,7 +38,7 @@ static bool is_wide(const pfl_t *f)
 {
     const float *ok_sigma = f->config->watch->ok_sigma;
     const float *variance = f->cov;
-    bool wide = false;
+    bool wide = (ok_sigma != NULL) && (f->moments_current == MOMENTS_OVERFLOWED);
     for (uint32_t d = 0u; (ok_sigma != NULL) && (d < f->config->states); d++) {
         wide = wide || !(pfl_sqrt_kernel(*variance) < ok_sigma[d]);
         variance += f->config->states - d;
@@ -121,10 +121,8 @@ static void judge(pfl_t *f)
             enter(f, complaint ? PFL_PHASE_CONVERGING : PFL_PHASE_TRACKING);
         }
         break;
-    case PFL_PHASE_INIT:
-    case PFL_PHASE_LOST:
-    default:
-        break; /* only a fused measurement or a reset leads out */
+    default: /* INIT, LOST: only a fused measurement or a reset leads out */
+        break;
     }
 }
 
@@ -150,7 +148,7 @@ static void fused(pfl_t *f, uint32_t sensor)
     f->sensor[sensor].refused = 0u;
     set_mode(f, PFL_MODE_STALE, is_stale(f));
     set_mode(f, PFL_MODE_LEAN, w->lean >= LEAN_UPDATES);
-    if (f->moments_current == MOMENTS_CURRENT) {
+    if (f->moments_current != MOMENTS_STALE) {
         set_mode(f, PFL_MODE_WIDE, is_wide(f));
     }
     if (w->phase == (uint32_t)PFL_PHASE_INIT) {
@@ -231,8 +229,7 @@ pfl_status_t pfl_watch_keep(pfl_t *f, uint32_t what, uint32_t number, const void
     case WATCH_REFUSED:
         refused(f, number, z);
         break;
-    case WATCH_RESET:
-    default:
+    default: /* WATCH_RESET */
         restarted(f);
         break;
     }

@@ -80,6 +80,27 @@ void test_an_odd_batch_reads_no_further_than_its_length(void)
     }
 }
 
+static uint32_t moves;
+
+static void count_moves(void *user, const void *u, float dt_s, const pfl_batch_t *p)
+{
+    (void)user;
+    (void)u;
+    (void)dt_s;
+    TEST_ASSERT_EQUAL_FLOAT(-PFL_NOISE(p, PFL_ANTITHETIC_MAX - 1u)[0], PFL_NOISE(p, PFL_ANTITHETIC_MAX - 1u)[1]);
+    moves++;
+}
+
+/* A sanitizer sees a column beyond the last that there is room for. */
+void test_more_noises_than_there_is_room_for_are_cut_off(void)
+{
+    pfl_antithetic_t m = {count_moves, NULL, 50u};
+    const pfl_batch_t batch = {x, PFL_BATCH, columns, 0u, PFL_BATCH};
+    moves = 0u;
+    pfl_antithetic_predict(&m, NULL, 0.1f, &batch);
+    TEST_ASSERT_EQUAL_UINT32(1u, moves);
+}
+
 /* ---- A filter ---------------------------------------------------------------------------------------------------- */
 
 /* Mean square distance of the position from the Kalman filter's, in its variances, over seeds and steps. */

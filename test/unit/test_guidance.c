@@ -573,6 +573,7 @@ void test_nmpc_cost_and_solve_refuse_each_bad_argument_alone(void)
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_cost(&unset, &good, &plan, &work, &cost, NULL));
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_cost(&nmpc, NULL, &plan, &work, &cost, NULL));
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_cost(&nmpc, &good, NULL, &work, &cost, NULL));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_cost(&nmpc, &good, &plan, NULL, &cost, NULL));
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_cost(&nmpc, &good, &plan, &work, NULL, NULL));
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_solve(&nmpc, NULL, &plan, &work, NULL));
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_nmpc_solve(&nmpc, &good, NULL, &work, NULL));

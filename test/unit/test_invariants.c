@@ -49,6 +49,7 @@ void test_damage_of_the_control_block_is_seen(void)
     seen_in_word(&f->busy, 1u);
     seen_in_float(&f->log_weight_top, ut_infinity());
     seen_in_float(&f->log_weight_top, ut_nan(false));
+    seen_in_float(&f->log_weight_top, f->log_weight_top + 1.0f); /* no log-weight reaches it */
     seen_in_float(&f->ess, 0.5f);
     seen_in_float(&f->ess, (float)N + 0.5f);
     seen_in_float(&f->ess, ut_nan(false));
@@ -148,4 +149,13 @@ void test_a_fork_points_into_its_own_arena(void)
     for (size_t k = 0u; k < (sizeof from / sizeof from[0]); k++) {
         TEST_ASSERT_EQUAL_INT64((const char *)from[k] - (const char *)f, (const char *)to[k] - (const char *)copy);
     }
+}
+
+/* A top that memory errors took away: the search for its particle ends at the last one. */
+void test_the_search_for_a_lost_top_stays_in_the_array(void)
+{
+    f->log_weight_top = 1234.5f;
+    pfl_set_best(f, 0u);
+    TEST_ASSERT_EQUAL_UINT32(N - 1u, f->best_index);
+    TEST_ASSERT_EQUAL_HEX32(ut_bits(f->x[N - 1u]), ut_bits(f->best[0]));
 }

@@ -182,12 +182,15 @@ static pfl_status_t cut_at(uint32_t k, const pfl_config_t *c, const float *mean,
     return status;
 }
 
-void test_a_budget_spent_at_any_batch_either_refuses_or_defers(void)
+static void cut_everywhere(uint32_t circular_mask)
 {
     float mean[2];
     uint32_t refused = 0u;
     uint32_t deferred = 0u;
-    const pfl_config_t c = budgeted(BUDGET, 1.0f);
+    pfl_config_t c = budgeted(BUDGET, 1.0f);
+    c.circular_mask = circular_mask;
+    c.circular = pfl_circular_means;
+    jump_at = 0u;
     pfl_t *calm = ready(&c);
     reads = 0u;
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_update(calm, 0u, 100000u, &measured));
@@ -204,6 +207,51 @@ void test_a_budget_spent_at_any_batch_either_refuses_or_defers(void)
     }
     TEST_ASSERT_EQUAL_UINT32(4u, refused); /* before each of four batches */
     TEST_ASSERT_TRUE(deferred >= 5u);      /* at each batch of the moments, and before resampling */
+}
+
+void test_a_budget_spent_at_any_batch_either_refuses_or_defers(void)
+{
+    cut_everywhere(0u);
+}
+
+/* Angles need a sweep of their own before the rest. */
+void test_a_budget_spent_at_any_batch_of_angles_either_refuses_or_defers(void)
+{
+    cut_everywhere(2u);
+}
+
+void test_what_was_put_off_is_caught_up_without_resampling_where_that_is_not_due(void)
+{
+    const pfl_config_t c = budgeted(BUDGET, 0.0f);
+    pfl_t *calm = ready(&c);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_update(calm, 0u, 100000u, &measured));
+    pfl_t *f = ready(&c);
+    leap(7u, BUDGET + 1u);
+    TEST_ASSERT_EQUAL_INT(PFL_DEFERRED, pfl_update(f, 0u, 100000u, &measured));
+    TEST_ASSERT_TRUE((health_of(f).mode & PFL_MODE_PENDING) != 0u);
+    jump_at = 0u;
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_predict(calm, 200000u, NULL));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_predict(f, 200000u, NULL));
+    TEST_ASSERT_EQUAL_UINT32(0u, health_of(f).mode & PFL_MODE_PENDING);
+    TEST_ASSERT_EQUAL_UINT32(0u, health_of(f).resampled);
+    TEST_ASSERT_TRUE(ut_same_posterior(ut_snapshot(calm), ut_snapshot(f), pfl_snapshot_bytes(f)));
+}
+
+/* Fewer particles than the first group of a predict. */
+void test_a_small_cloud_catches_up_like_a_large_one(void)
+{
+    pfl_config_t c = budgeted(BUDGET, 1.0f);
+    c.particles = 5u;
+    pfl_t *calm = ready(&c);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_update(calm, 0u, 100000u, &measured));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_predict(calm, 200000u, NULL));
+    pfl_t *f = ready(&c);
+    leap(3u, BUDGET + 1u);
+    TEST_ASSERT_EQUAL_INT(PFL_DEFERRED, pfl_update(f, 0u, 100000u, &measured));
+    jump_at = 0u;
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_predict(f, 200000u, NULL));
+    TEST_ASSERT_EQUAL_UINT32(1u, health_of(f).resampled);
+    TEST_ASSERT_TRUE(ut_same_posterior(ut_snapshot(calm), ut_snapshot(f), pfl_snapshot_bytes(f)));
 }
 
 /* A second measurement after a deferral waits for the next cycle, and nothing is lost. */
@@ -492,4 +540,43 @@ void test_refusals_that_are_no_faults_do_not_call_the_hook(void)
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_update(f, 0u, 100000u, NULL));
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_update(f, 0u, 100000u, &measured));
     TEST_ASSERT_EQUAL_UINT32(0u, faults);
+}
+
+/* ---- A watch and its budget ------------------------------------------------------------------------------------------------- */
+
+/* Moments that were put off say nothing about the width of the cloud: the mode stays, and so does the phase. */
+void test_deferred_moments_leave_the_verdict_on_the_width(void)
+{
+    static const float narrow[2] = {1.0e-6f, 1.0e-6f};
+    static const pfl_watch_t watch = {.keep = pfl_watch_keep, .ok_sigma = narrow};
+    pfl_config_t c = budgeted(BUDGET, 1.0f);
+    c.watch = &watch;
+    pfl_t *f = ready(&c);
+    leap(7u, BUDGET + 1u);
+    TEST_ASSERT_EQUAL_INT(PFL_DEFERRED, pfl_update(f, 0u, 100000u, &measured));
+    TEST_ASSERT_EQUAL_UINT32(0u, health_of(f).mode & PFL_MODE_WIDE);
+    jump_at = 0u;
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_predict(f, 200000u, NULL));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_update(f, 0u, 200000u, &measured));
+    TEST_ASSERT_TRUE((health_of(f).mode & PFL_MODE_WIDE) != 0u);
+}
+
+/* The overrun of a cycle in which everything else is well. */
+void test_an_overrun_degrades(void)
+{
+    static const pfl_watch_t watch = {.keep = pfl_watch_keep};
+    pfl_config_t c = budgeted(BUDGET, 1.0f);
+    c.watch = &watch;
+    pfl_t *f = ut_filter(&c);
+    uint64_t t_us = 0u;
+    for (uint32_t k = 0u; k < 12u; k++) {
+        t_us += 100000u;
+        (void)ut_fly_linear(f, t_us, 0.0f, 0u);
+    }
+    TEST_ASSERT_EQUAL_INT(PFL_PHASE_TRACKING, health_of(f).phase);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_predict(f, t_us + 100000u, NULL));
+    leap(7u, BUDGET + 1u);
+    TEST_ASSERT_EQUAL_INT(PFL_DEFERRED, pfl_update(f, 0u, t_us + 100000u, &measured));
+    TEST_ASSERT_EQUAL_INT(PFL_PHASE_DEGRADED, health_of(f).phase);
+    TEST_ASSERT_EQUAL_UINT32(0u, health_of(f).fault);
 }

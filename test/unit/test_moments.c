@@ -508,3 +508,34 @@ void test_resampling_after_a_quantile_gives_the_same_bits(void)
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_resample(b));
     TEST_ASSERT_TRUE(ut_same_bytes(ut_snapshot(a), ut_snapshot(b), pfl_snapshot_bytes(a)));
 }
+
+/* A million particles at one place, and the one about which moments are taken at another: nearly all of the second moment
+ * is taken off again, and rounding alone would leave less than nothing. */
+static float elsewhere;
+
+static void two_places_draw(void *user, const pfl_batch_t *p)
+{
+    (void)user;
+    for (uint32_t i = 0u; i < p->n; i++) {
+        PFL_STATE(p, 0)[i] = ((p->first + i) == 0u) ? 0.0f : elsewhere;
+        PFL_STATE(p, 1)[i] = -PFL_STATE(p, 0)[i];
+    }
+}
+
+void test_no_rounding_makes_a_variance_negative(void)
+{
+    float m[2];
+    float v[4];
+    uint32_t zero = 0u;
+    pfl_config_t c = ut_dictated_config(PFL_PARTICLES_MAX, 2u);
+    c.draw = two_places_draw;
+    for (uint32_t k = 0u; k < 6u; k++) {
+        elsewhere = 1.1f + (0.1234567f * (float)k);
+        pfl_t *f = ut_filter(&c);
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_estimate(f, m, v));
+        TEST_ASSERT_TRUE((v[0] >= 0.0f) && (v[3] >= 0.0f));
+        zero += (v[0] > 0.0f) ? 0u : 1u;
+        ut_arenas_end();
+    }
+    TEST_ASSERT_TRUE_MESSAGE(zero > 0u, "this cloud no longer tests what it was made for");
+}

@@ -106,6 +106,21 @@ void test_without_a_measurement_it_is_the_model(void)
     }
 }
 
+/* A component whose noise drives no other state leaves all others where the model puts them. */
+void test_without_a_measurement_only_the_driven_states_move(void)
+{
+    float expected[STATES * N];
+    const pfl_batch_t other = {expected, N, noise, 0u, N};
+    memcpy(expected, x, sizeof x);
+    pfl_constant_velocity_predict(&still, NULL, DT_S, &other);
+    proposal.sigma_other[1] = 0.0f;
+    move(NULL);
+    for (uint32_t i = 0u; i < N; i++) {
+        TEST_ASSERT_EQUAL_UINT32(ut_bits(expected[PFL_CV_VY * N + i]), ut_bits(x[PFL_CV_VY * N + i]));
+        TEST_ASSERT_TRUE(ut_bits(x[PFL_CV_VX * N + i]) != ut_bits(expected[PFL_CV_VX * N + i]));
+    }
+}
+
 /* What has no noise is weighed only. */
 void test_a_component_without_noise_is_only_weighed(void)
 {

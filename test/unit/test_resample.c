@@ -522,3 +522,58 @@ void test_far_off_measurement_keeps_the_order_of_particles(void)
         TEST_ASSERT_EQUAL_UINT32_MESSAGE(N, offspring[17], text);
     }
 }
+
+/* ---- Many particles ------------------------------------------------------------------------------------------------ */
+
+static void dead_loglik(void *user, const void *z, const pfl_view_t *p, float *out)
+{
+    (void)user;
+    for (uint32_t i = 0u; i < p->n; i++) {
+        out[i] = ((p->first + i) < *(const uint32_t *)z) ? -INFINITY : 0.0f;
+    }
+}
+
+/* Copies of each particle after one resampling, the first `dead` of which are impossible. */
+static void resample_many(uint32_t n, uint32_t scheme, uint32_t dead, uint32_t *copies)
+{
+    static const pfl_sensor_t sensor = {.loglik = dead_loglik};
+    pfl_view_t view;
+    pfl_config_t c = indexed(n, scheme, 0.0f);
+    c.sensors = &sensor;
+    pfl_t *f = ut_filter(&c);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_predict(f, 1u, NULL));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_update(f, 0u, 1u, &dead));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_resample(f));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_particles(f, &view, NULL));
+    memset(copies, 0, sizeof *copies * n);
+    for (uint32_t i = 0u; i < n; i++) {
+        TEST_ASSERT_TRUE((view.x[i] >= 0.0f) && (view.x[i] < (float)n));
+        copies[(uint32_t)view.x[i]]++;
+    }
+}
+
+static uint32_t copies_of[65536];
+
+/* The integer weights are 32768 each here, and the teeth of the comb fall on them without a rest. */
+void test_equal_weights_keep_every_particle_where_the_comb_divides_them_evenly(void)
+{
+    enum { EVEN = 61035 };
+    for (uint32_t scheme = 0u; scheme < SCHEMES; scheme++) {
+        resample_many(EVEN, scheme, 0u, copies_of);
+        for (uint32_t i = 0u; (scheme != MULTINOMIAL) && (i < EVEN); i++) {
+            const uint32_t slack = (scheme == SYSTEMATIC) ? 0u : 1u;
+            TEST_ASSERT_TRUE((copies_of[i] + slack >= 1u) && (copies_of[i] <= 1u + slack));
+        }
+    }
+}
+
+/* Each share is 1 + 2^-16, a remainder too small to be drawn from: what is left goes to those that have copies. */
+void test_residual_gives_away_what_remainders_cannot_draw(void)
+{
+    resample_many(65536u, RESIDUAL, 1u, copies_of);
+    TEST_ASSERT_EQUAL_UINT32(0u, copies_of[0]);
+    TEST_ASSERT_EQUAL_UINT32(2u, copies_of[1]);
+    for (uint32_t i = 2u; i < 65536u; i++) {
+        TEST_ASSERT_EQUAL_UINT32(1u, copies_of[i]);
+    }
+}

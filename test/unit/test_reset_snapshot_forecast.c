@@ -5,6 +5,7 @@
 
 #include "unity.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -163,6 +164,31 @@ void test_a_draw_that_fails_leaves_all_particles_at_the_last_mean(void)
 }
 
 /* ---- A cloud whose moments do not fit a float --------------------------------------------------------------------------- */
+
+static float drawn_at;
+
+static void drawn_at_draw(void *user, const pfl_batch_t *p)
+{
+    (void)user;
+    for (uint32_t i = 0u; i < p->n; i++) {
+        PFL_STATE(p, 0)[i] = drawn_at;
+        PFL_STATE(p, 1)[i] = -drawn_at;
+    }
+}
+
+void test_a_jump_beyond_single_precision_is_the_largest_there_is(void)
+{
+    float delta[2];
+    pfl_config_t c = ut_linear_config(N);
+    c.draw = drawn_at_draw;
+    drawn_at = -3.0e38f;
+    pfl_t *f = ut_filter(&c);
+    drawn_at = 3.0e38f;
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_reset(f, 1000u));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_last_reset(f, NULL, NULL, delta));
+    TEST_ASSERT_EQUAL_HEX32(ut_bits(FLT_MAX), ut_bits(delta[0]));
+    TEST_ASSERT_EQUAL_HEX32(ut_bits(-FLT_MAX), ut_bits(delta[1]));
+}
 
 static float huge_draw_scale;
 
@@ -371,6 +397,7 @@ void test_a_snapshot_that_lies_under_a_right_checksum_is_refused(void)
         {3, 3u},
         {4, 3u},
         {11, 0x7F800000u},
+        {11, 0x43000000u}, /* a top that no log-weight reaches */
         {12, 0x7F800000u},
         {12, 0u},
         {12, 0xBF800000u},
