@@ -1,8 +1,25 @@
 /* What a filter answers: moments, the most likely particle, quantiles, the cloud, health, invariants. */
-#include "core.h"
+#include "guard.h"
 
 #include "rng_kernels.h"
 #include "sqrt_kernel.h"
+
+static bool all_finite(const float *x, uint32_t n)
+{
+    bool finite = true;
+    for (uint32_t k = 0u; k < n; k++) {
+        finite = finite && pfl_is_finite(x[k]);
+    }
+    return finite;
+}
+
+/* What lies in the cache may have been damaged there. */
+static bool cache_is_whole(const pfl_t *f)
+{
+    const uint32_t states = f->config->states;
+    const bool full = f->config->moments == (uint16_t)PFL_MOMENTS_FULL;
+    return all_finite(f->mean, states) && (!full || all_finite(f->cov, (states * (states + 1u)) / 2u));
+}
 
 static pfl_status_t copy_moments(const pfl_t *f, float *mean, float *cov)
 {
@@ -27,13 +44,16 @@ static pfl_status_t copy_moments(const pfl_t *f, float *mean, float *cov)
 
 static pfl_status_t estimate(pfl_t *f, float *mean, float *cov)
 {
+    if (!cache_is_whole(f)) {
+        f->moments_current = MOMENTS_STALE;
+    }
     pfl_refresh(f);
     return (f->moments_current == MOMENTS_OVERFLOWED) ? pfl_fault(f, PFL_ERR_NONFINITE) : copy_moments(f, mean, cov);
 }
 
 pfl_status_t pfl_estimate(pfl_t *f, float *mean, float *cov)
 {
-    if ((pfl_enter(f) == PFL_OK) && (f->moments_current == MOMENTS_CURRENT)) {
+    if ((pfl_enter(f) == PFL_OK) && (f->moments_current == MOMENTS_CURRENT) && cache_is_whole(f)) {
         return copy_moments(f, mean, cov); /* nothing changes, so nothing needs a new seal */
     }
     const pfl_status_t entered = pfl_begin(f);
@@ -45,7 +65,11 @@ pfl_status_t pfl_most_likely(const pfl_t *f, float *state)
     if ((f == NULL) || (state == NULL)) {
         return PFL_ERR_ARG;
     }
-    if (!pfl_is_alive(f)) {
+    const pfl_status_t intact = pfl_guard_look(f);
+    if (intact != PFL_OK) {
+        return intact;
+    }
+    if (!all_finite(f->best, f->config->states)) {
         return PFL_ERR_CORRUPT;
     }
     memcpy(state, f->best, sizeof(float) * f->config->states);
@@ -54,7 +78,7 @@ pfl_status_t pfl_most_likely(const pfl_t *f, float *state)
 
 float pfl_effective_sample_size(const pfl_t *f)
 {
-    return ((f != NULL) && pfl_is_alive(f)) ? f->ess : 0.0f;
+    return ((f != NULL) && (pfl_guard_look(f) != PFL_ERR_CORRUPT)) ? f->ess : 0.0f;
 }
 
 pfl_status_t pfl_particles(const pfl_t *f, pfl_view_t *view, float *log_weights)
@@ -62,13 +86,16 @@ pfl_status_t pfl_particles(const pfl_t *f, pfl_view_t *view, float *log_weights)
     if ((f == NULL) || (view == NULL)) {
         return PFL_ERR_ARG;
     }
-    if (!pfl_is_alive(f)) {
-        return PFL_ERR_CORRUPT;
+    const pfl_status_t intact = pfl_guard_look(f);
+    if (intact != PFL_OK) {
+        return intact;
     }
     const pfl_view_t all = {f->x, f->stride, 0u, f->config->particles};
     *view = all;
     for (uint32_t i = 0u; (log_weights != NULL) && (i < all.n); i++) {
-        log_weights[i] = (f->weights_equal != 0u) ? 0.0f : (f->log_weight[i] - f->log_weight_top);
+        const float relative = f->log_weight[i] - f->log_weight_top;
+        const float whole = (relative <= 0.0f) ? relative : pfl_from_bits((int32_t)0xFF800000u);
+        log_weights[i] = (f->weights_equal != 0u) ? 0.0f : whole;
     }
     return PFL_OK;
 }
@@ -78,8 +105,9 @@ pfl_status_t pfl_farthest(const pfl_t *f, uint16_t x_state, uint16_t y_state, fl
     if ((f == NULL) || (distance == NULL)) {
         return PFL_ERR_ARG;
     }
-    if (!pfl_is_alive(f)) {
-        return PFL_ERR_CORRUPT;
+    const pfl_status_t intact = pfl_guard_look(f);
+    if (intact != PFL_OK) {
+        return intact;
     }
     if ((x_state >= f->config->states) || (y_state >= f->config->states) || !pfl_is_finite(x) || !pfl_is_finite(y)) {
         return PFL_ERR_ARG;
@@ -145,6 +173,9 @@ static pfl_status_t quantile(pfl_t *f, uint16_t state, float p, float *value)
         } else {
             low = middle + 1u;
         }
+    }
+    if (!pfl_is_finite(from_key(low))) {
+        return pfl_fault(f, PFL_ERR_NONFINITE); /* damaged since the last predict */
     }
     *value = from_key(low);
     return PFL_OK;

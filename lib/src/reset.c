@@ -103,8 +103,14 @@ pfl_status_t pfl_last_reset(const pfl_t *f, uint32_t *count, uint64_t *t_us, flo
     if (f == NULL) {
         return PFL_ERR_ARG;
     }
-    if (!pfl_is_alive(f)) {
-        return PFL_ERR_CORRUPT;
+    const pfl_status_t intact = pfl_guard_look(f);
+    if (intact != PFL_OK) {
+        return intact;
+    }
+    for (uint32_t d = 0u; d < f->config->states; d++) {
+        if (!pfl_is_finite(f->delta[d])) {
+            return PFL_ERR_CORRUPT;
+        }
     }
     if (count != NULL) {
         *count = f->resets;

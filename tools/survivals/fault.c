@@ -510,12 +510,13 @@ uint32_t fault_callback_cost(uint32_t particles)
 
 /* ---- Snapshots ------------------------------------------------------------------------------------------------------- */
 
+bool fault_wants_blob(void)
+{
+    return is_on_in(REGION_SNAPSHOT);
+}
+
 void fault_blob(unsigned char *blob, size_t *bytes)
 {
-    if (!is_on_in(REGION_SNAPSHOT)) {
-        *bytes = 0u; /* nothing to bring back */
-        return;
-    }
     const span_t all = span(blob, *bytes);
     const size_t bit = (size_t)(fault.where[0] % (8u * *bytes));
     switch (fault.kind) {

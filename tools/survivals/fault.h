@@ -69,6 +69,7 @@ uint32_t fault_callback_cost(uint32_t particles);
 bool fault_asleep(void); /* the application does not run in this cycle */
 /* How often a sensor's sample is handed over: 0, 1 or 2 times; may change it and its time. */
 uint32_t fault_sample(uint32_t sensor, float z[2], uint64_t *t_us);
+bool fault_wants_blob(void);
 void fault_blob(unsigned char *blob, size_t *bytes);
 
 #endif

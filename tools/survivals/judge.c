@@ -3,7 +3,6 @@
 
 #include <math.h>
 #include <string.h>
-#include <stdlib.h>
 
 typedef struct {
     instant_t at[CYCLES];
@@ -72,7 +71,7 @@ static void trace_cycle(FILE *out, uint32_t k, const cycle_t *c, const instant_t
     fprintf(out, "%4u %-10s error %8.2f sigma %6.2f %6.2f  status", (unsigned)k,
             c->healthy ? phases[(uint32_t)c->health.phase % 6u] : "?", sqrt(judge_square(c, instant)), sqrt((double)c->cov[0]),
             sqrt((double)c->cov[STATES + 1u]));
-    for (uint32_t s = 0u; s < (2u + SENSORS); s++) {
+    for (uint32_t s = 0u; s < STATUSES; s++) {
         fprintf(out, " %d", (int)c->status[s]);
     }
     fprintf(out, "  fault %03x reject %x mode %02x event %03x mended %u%s%s%s\n", (unsigned)c->health.fault, (unsigned)c->health.reject,
@@ -91,7 +90,7 @@ static bool fly_clean(world_kind_t kind, uint32_t flight, bool dearest)
         return false;
     }
     bool good = true;
-    uint32_t lies = 0u; uint32_t worst = 0u;
+    uint32_t lies = 0u;
     for (uint32_t k = 0u; k < CYCLES; k++) {
         cycle_t cycle;
         if (!dearest && (k == WARM)) {
@@ -105,15 +104,12 @@ static bool fly_clean(world_kind_t kind, uint32_t flight, bool dearest)
             clean_rmse[kind] += (k >= WARM) ? (r->square[k] / (double)((CYCLES - WARM) * FLIGHTS)) : 0.0;
         }
         lies = judge_lies(&cycle, &r->at[k]) ? (lies + 1u) : 0u;
-        if (getenv("SHOWCLEAN")) { trace_cycle(stderr, k, &cycle, &r->at[k]); }
-        worst = lies > worst ? lies : worst;
         good = good && !cycle.nonfinite && (lies <= LIE_CYCLES);
     }
     if (!dearest) {
         r->hash_a = plane.hash_a;
         r->hash_b = plane.hash_b;
     }
-    if (!good) { fprintf(stderr, "kind %d flight %u dearest %d worst lies %u\n", (int)kind, flight, dearest, worst); }
     return good && plane_fences_stand();
 }
 

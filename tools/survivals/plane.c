@@ -271,20 +271,20 @@ static void fly_second(const instant_t *instant, uint64_t t_us)
     plane.hash_b = mix(mix(plane.hash_b, mean, STATES), cov, STATES * STATES);
 }
 
-/* Once a second: repair in idle time, and a snapshot, which comes back at once when it was damaged. */
+/* Once a second: repair in idle time, and a snapshot if one is to be damaged, which then comes back. */
 static void idle(cycle_t *out)
 {
     (void)pfl_scrub(plane.f, NULL);
     look_further(plane.f, out);
+    if (!fault_wants_blob()) {
+        return;
+    }
     plane.blob_bytes = pfl_snapshot_bytes(plane.f);
     if ((plane.blob_bytes <= sizeof plane.blob) && (plane.blob_bytes != 0u) &&
         (pfl_snapshot(plane.f, plane.blob, plane.blob_bytes) == PFL_OK)) {
         size_t bytes = plane.blob_bytes;
         fault_blob(plane.blob, &bytes);
-        if (bytes != 0u) {
-            keep(&out->status[1u + SENSORS], pfl_restore(plane.f, plane.blob, bytes));
-            plane.restores++;
-        }
+        keep(&out->status[2u + SENSORS], pfl_restore(plane.f, plane.blob, bytes));
     }
 }
 
@@ -322,7 +322,7 @@ void plane_cycle(uint32_t number, const instant_t *instant, cycle_t *out)
 {
     const uint32_t dt_us = (uint32_t)(1.0e6 / plane.plan.rate_hz);
     memset(out, 0, sizeof *out);
-    for (uint32_t k = 0u; k < (2u + SENSORS); k++) {
+    for (uint32_t k = 0u; k < STATUSES; k++) {
         out->status[k] = PFL_OK;
     }
     plane.clock_us += dt_us;
@@ -353,7 +353,7 @@ bool plane_complains(const cycle_t *cycle)
 {
     bool complains = !cycle->healthy || (cycle->health.phase != PFL_PHASE_TRACKING) || (cycle->health.fault != 0u) ||
                      (cycle->health.reject != 0u);
-    for (uint32_t k = 0u; k < (2u + SENSORS); k++) {
+    for (uint32_t k = 0u; k < STATUSES; k++) {
         complains = complains || (cycle->status[k] < PFL_OK);
     }
     return complains;

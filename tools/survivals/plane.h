@@ -8,6 +8,7 @@
 
 #include "core.h"
 
+#define STATUSES (3u + SENSORS)
 #define PARTICLES_MOST 104u
 #define ARENA_BYTES (PFL_ARENA_BYTES(PARTICLES_MOST, STATES, 4) + PFL_WATCH_BYTES(SENSORS))
 #define SECOND_PARTICLES 16u
@@ -40,7 +41,7 @@ typedef struct {
 
 /* What one cycle came to. */
 typedef struct {
-    pfl_status_t status[2u + SENSORS]; /* predict, updates, estimate */
+    pfl_status_t status[STATUSES]; /* predict, updates, estimate, restore */
     float mean[STATES];
     float cov[STATES * STATES];
     pfl_health_t health;
@@ -69,7 +70,7 @@ typedef struct {
     uint64_t lost_since; /* 0: not lost */
     uint64_t hash_a;     /* of every estimate so far */
     uint64_t hash_b;
-    uint32_t restarts, resets, restores; /* that the application made */
+    uint32_t restarts, resets;         /* that the application made */
     unsigned char blob[16384];           /* the last snapshot */
     size_t blob_bytes;
 } plane_t;

@@ -15,7 +15,7 @@ typedef struct {
 static void count(tally_t *tally, const cycle_t *cycle, const instant_t *instant, bool *alarmed)
 {
     bool critical = !cycle->healthy || (cycle->health.fault != 0u) || ((cycle->health.mode & PFL_MODE_USABLE) == 0u);
-    for (uint32_t k = 0u; k < (2u + SENSORS); k++) {
+    for (uint32_t k = 0u; k < STATUSES; k++) {
         tally->refused += (cycle->status[k] == PFL_REJECTED) ? 1u : 0u;
         critical = critical || ((cycle->status[k] < PFL_OK) && (cycle->status[k] != PFL_REJECTED));
     }
