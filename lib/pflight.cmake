@@ -31,6 +31,7 @@ set(PFLIGHT_LIB_SOURCES
   snapshot.c
   forecast.c
   meter.c
+  clock.c
   status.c
   guard.c
   watch.c
@@ -63,6 +64,7 @@ list(TRANSFORM PFLIGHT_LIB_SOURCES PREPEND "${CMAKE_CURRENT_LIST_DIR}/src/")
 set(PFLIGHT_LIB_HEADERS
   pflight.h
   antithetic.h
+  clock.h
   constraints.h
   filter.h
   guidance.h

@@ -1,8 +1,25 @@
 /* What a filter answers: moments, the most likely particle, quantiles, the cloud, health, invariants. */
-#include "core.h"
+#include "guard.h"
 
 #include "rng_kernels.h"
 #include "sqrt_kernel.h"
+
+static bool all_finite(const float *x, uint32_t n)
+{
+    bool finite = true;
+    for (uint32_t k = 0u; k < n; k++) {
+        finite = finite && pfl_is_finite(x[k]);
+    }
+    return finite;
+}
+
+/* What lies in the cache may have been damaged there. */
+static bool cache_is_whole(const pfl_t *f)
+{
+    const uint32_t states = f->config->states;
+    const bool full = f->config->moments == (uint16_t)PFL_MOMENTS_FULL;
+    return all_finite(f->mean, states) && (!full || all_finite(f->cov, (states * (states + 1u)) / 2u));
+}
 
 static void copy_moments(const pfl_t *f, float *mean, float *cov)
 {
@@ -26,6 +43,9 @@ static pfl_status_t estimate(pfl_t *f, float *mean, float *cov)
     if ((cov != NULL) && (f->config->moments != (uint16_t)PFL_MOMENTS_FULL)) {
         return PFL_ERR_CONFIG;
     }
+    if (!cache_is_whole(f)) {
+        f->moments_current = MOMENTS_STALE;
+    }
     pfl_refresh(f);
     if (f->moments_current == MOMENTS_OVERFLOWED) {
         return pfl_fault(f, PFL_ERR_NONFINITE);
@@ -36,7 +56,7 @@ static pfl_status_t estimate(pfl_t *f, float *mean, float *cov)
 
 pfl_status_t pfl_estimate(pfl_t *f, float *mean, float *cov)
 {
-    if ((pfl_enter(f) == PFL_OK) && (f->moments_current == MOMENTS_CURRENT)) {
+    if ((pfl_enter(f) == PFL_OK) && (f->moments_current == MOMENTS_CURRENT) && cache_is_whole(f)) {
         return estimate(f, mean, cov); /* nothing changes, so nothing needs a new seal */
     }
     const pfl_status_t entered = pfl_begin(f);
@@ -48,6 +68,9 @@ pfl_status_t pfl_most_likely(const pfl_t *f, float *state)
     const pfl_status_t looked = (state != NULL) ? pfl_look(f) : PFL_ERR_ARG;
     if (looked != PFL_OK) {
         return looked;
+    }
+    if (!all_finite(f->best, f->config->states)) {
+        return PFL_ERR_CORRUPT;
     }
     memcpy(state, f->best, sizeof(float) * f->config->states);
     return PFL_OK;
@@ -67,7 +90,9 @@ pfl_status_t pfl_particles(const pfl_t *f, pfl_view_t *view, float *log_weights)
     const pfl_view_t all = {f->x, f->stride, 0u, f->config->particles};
     *view = all;
     for (uint32_t i = 0u; (log_weights != NULL) && (i < all.n); i++) {
-        log_weights[i] = (f->weights_equal != 0u) ? 0.0f : (f->log_weight[i] - f->log_weight_top);
+        const float relative = f->log_weight[i] - f->log_weight_top;
+        const float whole = (relative <= 0.0f) ? relative : pfl_from_bits((int32_t)0xFF800000u);
+        log_weights[i] = (f->weights_equal != 0u) ? 0.0f : whole;
     }
     return PFL_OK;
 }
@@ -148,6 +173,9 @@ static pfl_status_t quantile(pfl_t *f, uint16_t state, float p, float *value)
         } else {
             low = middle + 1u;
         }
+    }
+    if (!pfl_is_finite(from_key(low))) {
+        return pfl_fault(f, PFL_ERR_NONFINITE); /* damaged since the last predict */
     }
     *value = from_key(low);
     return PFL_OK;

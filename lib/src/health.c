@@ -1,5 +1,5 @@
 /* What a filter tells of its health: everything, one sensor, and the record of a filter cycle. */
-#include "core.h"
+#include "guard.h"
 
 typedef char pfl_record_has_32_bytes[(sizeof(pfl_record_t) == 32u) ? 1 : -1];
 
@@ -12,7 +12,8 @@ float pfl_worst_ratio(const pfl_t *f)
 {
     float worst = f->test_ratio;
     for (uint32_t k = 0u; (f->sensor != NULL) && (k < f->config->sensor_count); k++) {
-        worst = (f->sensor[k].test_ratio > worst) ? f->sensor[k].test_ratio : worst;
+        const float ratio = f->sensor[k].test_ratio;
+        worst = (pfl_is_finite(ratio) && (ratio > worst)) ? ratio : worst;
     }
     const bool settling = f->watched.phase == (uint32_t)PFL_PHASE_SETTLING;
     return (settling && (worst < f->watched.ratio_before)) ? f->watched.ratio_before : worst;
@@ -67,7 +68,8 @@ pfl_status_t pfl_sensor_health(const pfl_t *f, uint16_t sensor, pfl_sensor_healt
         return PFL_ERR_CONFIG;
     }
     const pfl_sensor_track_t *track = &f->sensor[sensor];
-    const pfl_sensor_health_t health = {track->t_fused_us, track->test_ratio, track->refused, track->same};
+    const float ratio = pfl_is_finite(track->test_ratio) ? track->test_ratio : FLT_MAX;
+    const pfl_sensor_health_t health = {track->t_fused_us, ratio, track->refused, track->same};
     *out = health;
     return PFL_OK;
 }
@@ -88,6 +90,6 @@ pfl_status_t pfl_record(const pfl_t *f, pfl_record_t *out)
     out->event = (uint16_t)f->watched.event;
     out->reject = (uint16_t)(f->watched.reject & 0xFFFFu);
     out->state = (uint8_t)((f->watched.phase & 0xFu) | ((mode_of(f) & 0xFu) << 4));
-    out->ratio = (ratio < 255.0f) ? (uint8_t)ratio : 255u;
+    out->ratio = (ratio < 255.0f) ? (uint8_t)ratio : (uint8_t)255u;
     return PFL_OK;
 }

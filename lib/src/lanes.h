@@ -86,15 +86,16 @@ static inline void pfl_lanes_products(float *restrict rows, const float *restric
 }
 
 /* exp(-e) for e >= 0: 2^y, y = k + r, |r| <= 1/2. 0 below 2^-63, so that no square is a subnormal number, and a particle
- * without weight has none however far away it is. */
+ * without weight has none however far away it is. 0 for e < 0 and NaN too, which only damaged memory can give: what is
+ * resampled by them must lie in 0 .. 1. */
 static inline float pfl_weight_of(float e)
 {
-    const int32_t most = 0x422E47AE; /* 43.57; floats without sign are ordered as their bits */
+    const uint32_t most = 0x422E47AEu; /* 43.57; floats without sign are ordered as their bits */
 #if PFL_VECTOR_LANES > 1
-    const int32_t counts = -(int32_t)(pfl_bits(e) < most);
+    const int32_t counts = -(int32_t)((uint32_t)pfl_bits(e) < most);
     const float y = pfl_from_bits(pfl_bits(e) & counts) * -1.44269504f;
 #else
-    if (pfl_bits(e) >= most) {
+    if ((uint32_t)pfl_bits(e) >= most) {
         return 0.0f;
     }
     const int32_t counts = -1;

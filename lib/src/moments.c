@@ -144,7 +144,7 @@ static void finish_weights(pfl_t *f)
     const float sum = row_sum(f, ROW_WEIGHT);
     const float ess = (sum * sum) / row_sum(f, ROW_SQUARE);
     const float count = (float)f->config->particles;
-    const float at_least_one = (ess < 1.0f) ? 1.0f : ess;
+    const float at_least_one = (ess >= 1.0f) ? ess : 1.0f; /* never NaN */
     f->weight_sum = sum;
     f->ess = (at_least_one > count) ? count : at_least_one;
     f->scratch_is_weights = 1u;
@@ -192,13 +192,33 @@ static bool sweep(pfl_t *f, bool budgeted, uint32_t passes)
     return true;
 }
 
-void pfl_weights(pfl_t *f)
+/* The heaviest particle weighs one: a smaller sum is that of damaged log-weights. */
+static bool sum_is_sound(const pfl_t *f)
 {
-    if (f->scratch_is_weights != 0u) {
-        return;
-    }
+    return row_sum(f, ROW_WEIGHT) >= 0.5f;
+}
+
+static void mend_weights(pfl_t *f)
+{
+    pfl_count(&f->mended, pfl_mend_log_weights(f));
+    pfl_weights_after_loss(f);
+    f->watched.event |= PFL_EVENT_MENDED;
+}
+
+static void sum_up_weights(pfl_t *f)
+{
     memset(f->lanes, 0, sizeof(float) * PFL_LANES * ROW_MEAN);
     (void)sweep(f, false, PASS_WEIGHTS);
+}
+
+/* Always anew: between two calls weights may have been damaged, and resampling trusts their sum. */
+void pfl_weights(pfl_t *f)
+{
+    sum_up_weights(f);
+    if (!sum_is_sound(f)) {
+        mend_weights(f);
+        sum_up_weights(f);
+    }
     f->weight_sum = row_sum(f, ROW_WEIGHT);
     f->scratch_is_weights = 1u;
 }
@@ -253,6 +273,10 @@ bool pfl_moments(pfl_t *f, bool budgeted)
     if (!sum_up(f, budgeted)) {
         mend_centre(f);
         return false;
+    }
+    if (!sum_is_sound(f)) {
+        mend_weights(f);
+        (void)sum_up(f, false);
     }
     finish_weights(f);
     finish(f, f->mean, f->cov);

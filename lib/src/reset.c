@@ -105,6 +105,11 @@ pfl_status_t pfl_last_reset(const pfl_t *f, uint32_t *count, uint64_t *t_us, flo
     if (looked != PFL_OK) {
         return looked;
     }
+    for (uint32_t d = 0u; d < f->config->states; d++) {
+        if (!pfl_is_finite(f->delta[d])) {
+            return PFL_ERR_CORRUPT; /* damaged where it lay */
+        }
+    }
     if (count != NULL) {
         *count = f->resets;
     }

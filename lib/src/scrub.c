@@ -17,7 +17,7 @@ static uint32_t count_outside_box(const pfl_t *f)
 }
 
 /* Log-weights that no update can have written. */
-static uint32_t mend_log_weights(pfl_t *f)
+uint32_t pfl_mend_log_weights(pfl_t *f)
 {
     uint32_t bad = 0u;
     for (uint32_t i = 0u; i < f->config->particles; i++) {
@@ -62,7 +62,7 @@ pfl_status_t pfl_scrub(pfl_t *f, uint32_t *mended)
     pfl_count(&f->mended, mend_best(f) + count_outside_box(f));
     pfl_count(&f->mended, pfl_quarantine(f, 0u, f->config->particles));
     pfl_clip_to_box(f, 0u, f->config->particles);
-    pfl_count(&f->mended, mend_log_weights(f));
+    pfl_count(&f->mended, pfl_mend_log_weights(f));
     pfl_count(&f->mended, pfl_revive_random(f) ? 1u : 0u);
     if (f->mended != before) {
         pfl_weights_after_loss(f);

@@ -24,12 +24,17 @@ static uint64_t since(uint64_t now_us, uint64_t then_us)
 
 /* ---- What holds now ------------------------------------------------------------------------------------------- */
 
+static bool sensor_is_stale(const pfl_t *f, uint32_t k)
+{
+    const uint32_t timeout_us = f->config->sensors[k].timeout_us;
+    return (timeout_us != 0u) && (since(f->t_us, f->sensor[k].t_fused_us) > timeout_us);
+}
+
 static bool is_stale(const pfl_t *f)
 {
     bool stale = false;
     for (uint32_t k = 0u; k < f->config->sensor_count; k++) {
-        const uint32_t timeout_us = f->config->sensors[k].timeout_us;
-        stale = stale || ((timeout_us != 0u) && (since(f->t_us, f->sensor[k].t_fused_us) > timeout_us));
+        stale = stale || sensor_is_stale(f, k);
     }
     return stale;
 }
@@ -60,10 +65,26 @@ static bool has_complaint(const pfl_t *f)
            ((w->mode & (PFL_MODE_STALE | PFL_MODE_WIDE | PFL_MODE_LEAN)) != 0u);
 }
 
+/* Are all sensors that could place the cloud anew, those with a redraw, refused or silent? Others may well agree with a
+ * cloud in the wrong place: a velocity does not tell where it is. */
+static bool is_misplaced(const pfl_t *f, uint32_t rejects)
+{
+    bool refused = false;
+    for (uint32_t k = 0u; k < f->config->sensor_count; k++) {
+        const bool against = f->sensor[k].refused >= rejects;
+        if ((f->config->sensors[k].redraw != NULL) && !against && !sensor_is_stale(f, k)) {
+            return false;
+        }
+        refused = refused || (against && (f->config->sensors[k].redraw != NULL));
+    }
+    return refused;
+}
+
 static bool is_lost(const pfl_t *f)
 {
     const pfl_watch_t *limits = f->config->watch;
-    return (f->watched.refused >= limit(limits->lost_rejects, LOST_REJECTS)) ||
+    const uint32_t rejects = limit(limits->lost_rejects, LOST_REJECTS);
+    return (f->watched.refused >= rejects) || is_misplaced(f, rejects) ||
            (since(f->t_us, f->t_fused_us) > limit(limits->lost_us, LOST_US));
 }
 
@@ -81,6 +102,9 @@ static void settle(pfl_t *f)
 {
     f->watched.settled = 0u;
     f->watched.refused = 0u;
+    for (uint32_t k = 0u; k < f->config->sensor_count; k++) {
+        f->sensor[k].refused = 0u;
+    }
     enter(f, PFL_PHASE_SETTLING);
 }
 

@@ -3,6 +3,7 @@
 #define PFLIGHT_PFLIGHT_H
 
 #include "pflight/antithetic.h"
+#include "pflight/clock.h"
 #include "pflight/constraints.h"
 #include "pflight/filter.h"
 #include "pflight/guidance.h"
