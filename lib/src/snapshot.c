@@ -231,7 +231,10 @@ static bool numbers_fit(const pfl_t *f, const unsigned char *at)
 
 static bool watch_fits(const pfl_t *f, const unsigned char *at)
 {
-    return (word_at(at, 29) == tracked(f)) && (word_at(at, 32) <= (uint32_t)PFL_PHASE_SETTLING) &&
+    const uint32_t sensors = f->config->sensor_count;
+    const bool known =
+        (sensors == 32u) || ((word_at(at, 34) >> sensors) == 0u); /* whose last measurement was refused */
+    return known && (word_at(at, 29) == tracked(f)) && (word_at(at, 32) <= (uint32_t)PFL_PHASE_SETTLING) &&
            pfl_is_finite(float_at(at, 41)) && pfl_is_finite(float_at(at, 42));
 }
 

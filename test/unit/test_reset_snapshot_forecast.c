@@ -412,6 +412,7 @@ void test_a_snapshot_that_lies_under_a_right_checksum_is_refused(void)
         {27, COUNT},
         {29, 1u},          /* sensors under watch */
         {32, 6u},          /* no such phase */
+        {34, 2u},          /* a refusal by a sensor that is not there */
         {41, 0x7F800000u}, /* best log-likelihood */
         {42, 0x7FC00000u}, /* test ratio before */
         {MOMENTS, 0x7FC00000u},

@@ -245,6 +245,11 @@ pfl_status_t pfl_reset(pfl_t *f, uint64_t t_us);
  * Null outputs are skipped; zeros before the first reset. PFL_OK, PFL_ERR_ARG, PFL_ERR_CORRUPT. O(D). */
 pfl_status_t pfl_last_reset(const pfl_t *f, uint32_t *count, uint64_t *t_us, float *delta);
 
+/* Every call below looks at the guards first (docs/health.md) and then may answer, besides what stands there,
+ * PFL_ERR_CONFIG: bytes of the configuration changed since pfl_init, nothing was done; or PFL_ERR_CORRUPT: no live filter,
+ * or one beyond repair, nothing was done. PFL_ERR_CORRUPT also ends a call in which something, a callback most likely,
+ * wrote outside its place; what the call did then stands. */
+
 /* ---- A filter cycle ----------------------------------------------------------------------------------------- */
 
 /* Moves every particle to t_us through the predict callback; begins a filter cycle for the budget.
