@@ -33,6 +33,13 @@ PFL_NOINLINE static uint32_t hash_words(uint32_t hash, const void *bytes, size_t
     return hash;
 }
 
+PFL_NOINLINE static void count_mended(pfl_t *f, uint32_t fault)
+{
+    f->watched.fault |= fault;
+    f->watched.event |= PFL_EVENT_MENDED;
+    pfl_count(&f->mended, 1u);
+}
+
 /* ---- Configuration -------------------------------------------------------------------------------------------- */
 
 static uint32_t hash_of_parts(uint32_t hash, const pfl_config_t *c)
@@ -99,19 +106,15 @@ static damage_t look_at_block(const pfl_t *f)
 static void mend_block(pfl_t *f)
 {
     PFL_COPY(f, f->copy, 4u * SEALED_WORDS);
-    f->watched.fault |= PFL_FAULT_CONTROL;
-    f->watched.event |= PFL_EVENT_MENDED;
-    pfl_count(&f->mended, 1u);
+    count_mended(f, PFL_FAULT_CONTROL);
 }
 
 /* During a call the seal is that of the copy. */
-static void mend_constants(pfl_t *f)
+PFL_NOINLINE static void mend_constants(pfl_t *f)
 {
     if (hash_words(1u, f->copy, SEALED_WORDS) == f->seal) {
         PFL_COPY(f, f->copy, 4u * CONSTANT_WORDS);
-        f->watched.fault |= PFL_FAULT_CONTROL;
-        f->watched.event |= PFL_EVENT_MENDED;
-        pfl_count(&f->mended, 1u);
+        count_mended(f, PFL_FAULT_CONTROL);
     }
 }
 
@@ -259,9 +262,7 @@ pfl_status_t pfl_guard_close(pfl_t *f, pfl_status_t status)
     pfl_status_t answer = status;
     if ((PFL_GUARD_CANARIES != 0) && !canaries_are_alive(f)) {
         set_canaries(f);
-        f->watched.fault |= PFL_FAULT_CANARY;
-        f->watched.event |= PFL_EVENT_MENDED;
-        pfl_count(&f->mended, 1u);
+        count_mended(f, PFL_FAULT_CANARY);
         answer = pfl_fault(f, PFL_ERR_CORRUPT);
     }
     seal(f);
