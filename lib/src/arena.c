@@ -85,8 +85,8 @@ static bool choices_are_good(const pfl_config_t *c)
 
 bool pfl_config_is_good(const pfl_config_t *c)
 {
-    return sizes_are_good(c) && (c->predict != NULL) && choices_are_good(c) &&
-           sensors_are_good(c) && box_is_good(c) && constraint_is_good(c) && kernel_is_good(c) && watch_is_good(c);
+    return sizes_are_good(c) && (c->predict != NULL) && choices_are_good(c) && sensors_are_good(c) && box_is_good(c) &&
+           constraint_is_good(c) && kernel_is_good(c) && watch_is_good(c);
 }
 
 size_t pfl_arena_bytes(const pfl_config_t *config)

@@ -22,6 +22,14 @@
 #define PFL_COPY(to, from, bytes) ((void)memcpy((to), (from), (bytes)))
 #endif
 
+/* Keeps a function's frame off the stack of its siblings: inlined, the largest of them would count for all. Also for
+ * what is called from several places and seldom: once is enough. */
+#if defined(__GNUC__)
+#define PFL_NOINLINE __attribute__((noinline))
+#else
+#define PFL_NOINLINE
+#endif
+
 /* Floats in a vector register of the target; 1: it has none that rounds as IEEE 754 says, and scalar forms are the
  * faster ones. Both forms of a kernel give the same bits (test_lanes.c). */
 #if !defined(PFL_VECTOR_LANES)

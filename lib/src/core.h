@@ -16,13 +16,6 @@
 
 #include "bits.h"
 
-/* Keeps a function's frame off the stack of its siblings: inlined, the largest of them would count for all. */
-#if defined(__GNUC__)
-#define PFL_NOINLINE __attribute__((noinline))
-#else
-#define PFL_NOINLINE
-#endif
-
 #define PFL_COPY_WORDS 112u   /* room for the sealed part of the control block on 64-bit machines */
 #define PFL_ALIVE 0x70666C79u /* "pfly": the arena holds a filter */
 #define PFL_GROUP 16u         /* particles in the first batch of a predict, which decides whether to go on */
@@ -184,7 +177,7 @@ float pfl_worst_ratio(const pfl_t *f); /* of the sensors' test ratios */
 
 /* scrub.c */
 uint32_t pfl_mend_log_weights(pfl_t *f); /* such as no update can have written count as no weight; how many */
-bool pfl_revive_random(pfl_t *f); /* seeds dead streams anew; true when there were such */
+bool pfl_revive_random(pfl_t *f);        /* seeds dead streams anew; true when there were such */
 
 /* reset.c */
 void pfl_reinject(pfl_t *f, uint32_t sensor, const void *z);

@@ -4,7 +4,7 @@
 #include "rng_kernels.h"
 #include "sqrt_kernel.h"
 
-static bool all_finite(const float *x, uint32_t n)
+PFL_NOINLINE static bool all_finite(const float *x, uint32_t n)
 {
     bool finite = true;
     for (uint32_t k = 0u; k < n; k++) {

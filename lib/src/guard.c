@@ -35,7 +35,7 @@ PFL_NOINLINE static uint32_t hash_words(uint32_t hash, const void *bytes, size_t
 }
 
 /* The same of the control block, by words as long as the machine's. */
-static uintptr_t hash_block(const void *block)
+PFL_NOINLINE static uintptr_t hash_block(const void *block)
 {
     const unsigned char *at = (const unsigned char *)block;
     uintptr_t hash = 1u;
@@ -46,6 +46,13 @@ static uintptr_t hash_block(const void *block)
         hash = (hash << 13) | (hash >> ((8u * sizeof hash) - 13u));
     }
     return hash;
+}
+
+PFL_NOINLINE static void count_mended(pfl_t *f, uint32_t fault)
+{
+    f->watched.fault |= fault;
+    f->watched.event |= PFL_EVENT_MENDED;
+    pfl_count(&f->mended, 1u);
 }
 
 /* ---- Configuration -------------------------------------------------------------------------------------------- */
@@ -122,19 +129,15 @@ static damage_t look_at_block(const pfl_t *f)
 static void mend_block(pfl_t *f)
 {
     PFL_COPY(f, f->copy, 4u * SEALED_WORDS);
-    f->watched.fault |= PFL_FAULT_CONTROL;
-    f->watched.event |= PFL_EVENT_MENDED;
-    pfl_count(&f->mended, 1u);
+    count_mended(f, PFL_FAULT_CONTROL);
 }
 
 /* During a call the seal is that of the copy. */
-static void mend_constants(pfl_t *f)
+PFL_NOINLINE static void mend_constants(pfl_t *f)
 {
     if (hash_block(f->copy) == f->seal) {
         PFL_COPY(f, f->copy, 4u * CONSTANT_WORDS);
-        f->watched.fault |= PFL_FAULT_CONTROL;
-        f->watched.event |= PFL_EVENT_MENDED;
-        pfl_count(&f->mended, 1u);
+        count_mended(f, PFL_FAULT_CONTROL);
     }
 }
 
@@ -159,7 +162,7 @@ void pfl_guard_take_over(pfl_t *f)
 {
     if (PFL_GUARD_CONTROL != 0) {
         PFL_COPY(f->copy, f, 4u * CONSTANT_WORDS);
-        f->seal = hash_words(1u, f->copy, SEALED_WORDS);
+        f->seal = hash_block(f->copy);
     }
 }
 
@@ -225,20 +228,16 @@ static uint32_t canaries_of(const pfl_t *f)
     return f->config->states + 3u;
 }
 
-static bool canaries_are_alive(const pfl_t *f)
+/* Sets them; true when all of them were alive. */
+PFL_NOINLINE static bool set_canaries(const pfl_t *f)
 {
     uint32_t different = 0u;
     for (uint32_t k = 0u; k < canaries_of(f); k++) {
-        different |= pfl_load_u32(canary_at(f, k)) ^ SENTINEL;
+        float *canary = canary_at(f, k);
+        different |= pfl_load_u32(canary) ^ SENTINEL;
+        pfl_store_u32(canary, SENTINEL);
     }
     return different == 0u;
-}
-
-PFL_NOINLINE static void set_canaries(const pfl_t *f)
-{
-    for (uint32_t k = 0u; k < canaries_of(f); k++) {
-        pfl_store_u32(canary_at(f, k), SENTINEL);
-    }
 }
 
 /* ---- Calls ---------------------------------------------------------------------------------------------------- */
@@ -248,7 +247,7 @@ void pfl_guard_start(pfl_t *f)
     f->config_hash = hash_words(1u, f->config, sizeof *f->config / 4u);
     f->parts_hash = hash_of_parts(f->config_hash, f->config);
     f->limits_hash = hash_of_limits(f->config_hash, f->config);
-    set_canaries(f);
+    (void)set_canaries(f);
     seal(f);
 }
 
@@ -284,11 +283,8 @@ pfl_status_t pfl_guard_open(pfl_t *f)
 pfl_status_t pfl_guard_close(pfl_t *f, pfl_status_t status)
 {
     pfl_status_t answer = status;
-    if ((PFL_GUARD_CANARIES != 0) && !canaries_are_alive(f)) {
-        set_canaries(f);
-        f->watched.fault |= PFL_FAULT_CANARY;
-        f->watched.event |= PFL_EVENT_MENDED;
-        pfl_count(&f->mended, 1u);
+    if ((PFL_GUARD_CANARIES != 0) && !set_canaries(f)) {
+        count_mended(f, PFL_FAULT_CANARY);
         answer = pfl_fault(f, PFL_ERR_CORRUPT);
     }
     seal(f);

@@ -23,27 +23,45 @@ static inline float pfl_lane_sum(const float *row)
     return ((row[0] + row[1]) + (row[2] + row[3])) + ((row[4] + row[5]) + (row[6] + row[7]));
 }
 
-/* row += the elements of the columns at x, x + near, x + far and x + near + far, in any order */
-static inline void pfl_lanes_sum(float *restrict row, const float *restrict x, size_t near, size_t far, uint32_t n)
+/* The sum of `columns` columns, `stride` apart, in any order: of use is only whether it is finite. */
+#if PFL_VECTOR_LANES > 1
+static inline float pfl_lanes_sum(const float *restrict columns_at, size_t stride, uint32_t columns, uint32_t n)
 {
+    const size_t near =
+        (columns > 1u) ? stride : 0u; /* four at a time, some of them twice where there are not so many */
+    const size_t far = ((columns > 3u) ? 2u : (columns - ((columns > 1u) ? 2u : 1u))) * stride;
+    float row[PFL_LANES] = {0.0f};
     pfl_part_t *sum = (pfl_part_t *)row;
-    const pfl_part_t *a = (const pfl_part_t *)x;
-    const pfl_part_t *b = (const pfl_part_t *)(x + near);
-    const pfl_part_t *c = (const pfl_part_t *)(x + far);
-    const pfl_part_t *d = (const pfl_part_t *)(x + near + far);
-    for (uint32_t groups = n / PFL_LANES; groups > 0u; groups--) {
-        for (uint32_t k = 0u; k < PFL_LANE_PARTS; k++) {
-            sum[k] += a[k];
-            sum[k] += b[k];
-            sum[k] += c[k];
-            sum[k] += d[k];
+    for (uint32_t column = 0u; column < columns; column += 4u) {
+        const uint32_t from = ((columns > 4u) && ((columns - column) < 4u)) ? (columns - 4u) : column;
+        const float *x = &columns_at[from * stride];
+        const pfl_part_t *a = (const pfl_part_t *)x;
+        const pfl_part_t *b = (const pfl_part_t *)(x + near);
+        const pfl_part_t *c = (const pfl_part_t *)(x + far);
+        const pfl_part_t *d = (const pfl_part_t *)(x + near + far);
+        for (uint32_t k = 0u; k < (n / PFL_VECTOR_LANES); k++) {
+            sum[k % PFL_LANE_PARTS] += (a[k] + b[k]) + (c[k] + d[k]);
         }
-        a += PFL_LANE_PARTS;
-        b += PFL_LANE_PARTS;
-        c += PFL_LANE_PARTS;
-        d += PFL_LANE_PARTS;
     }
+    return pfl_lane_sum(row);
 }
+#else
+static inline float pfl_lanes_sum(const float *restrict columns_at, size_t stride, uint32_t columns, uint32_t n)
+{
+    float sum[4] = {0.0f, 0.0f, 0.0f, 0.0f};
+    for (uint32_t column = 0u; column < columns; column++) {
+        const float *x = &columns_at[column * stride];
+        for (uint32_t quads = n / 4u; quads > 0u; quads--) {
+            sum[0] += x[0];
+            sum[1] += x[1];
+            sum[2] += x[2];
+            sum[3] += x[3];
+            x += 4;
+        }
+    }
+    return (sum[0] + sum[1]) + (sum[2] + sum[3]);
+}
+#endif
 
 /* row += w (x - centre) */
 static inline void pfl_lanes_product(float *restrict row, const float *restrict w, const float *restrict x,

@@ -259,7 +259,7 @@ static bool moments_are_finite(const pfl_t *f)
 }
 
 /* Angles beyond all reason have no centre. Nothing that is not finite stays in the arena. */
-static void mend_centre(const pfl_t *f)
+PFL_NOINLINE static void mend_centre(const pfl_t *f)
 {
     for (uint32_t d = 0u; d < f->config->states; d++) {
         f->centre[d] = pfl_is_finite(f->centre[d]) ? f->centre[d] : 0.0f;

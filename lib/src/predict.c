@@ -6,7 +6,7 @@
 
 /* ---- Particles that are not finite ---------------------------------------------------------------------------- */
 
-static bool particle_is_finite(const pfl_t *f, uint32_t i)
+PFL_NOINLINE static bool particle_is_finite(const pfl_t *f, uint32_t i)
 {
     bool finite = true;
     for (uint32_t d = 0u; d < f->config->states; d++) {
@@ -24,20 +24,10 @@ uint32_t pfl_count_nonfinite(const pfl_t *f, uint32_t first, uint32_t n)
     return found;
 }
 
-/* One addition a value: a NaN or an infinity anywhere in the batch stays in the sum. Four columns at a time; where
- * fewer are left some count again. */
+/* One addition a value: a NaN or an infinity anywhere in the batch stays in the sum. */
 PFL_NOINLINE static bool batch_is_suspect(const pfl_t *f, uint32_t first, uint32_t n)
 {
-    const uint32_t states = f->config->states;
-    const size_t near = (states > 1u) ? 1u : 0u;
-    const size_t far = (states > 3u) ? 2u : (states - 1u - near);
-    float row[PFL_LANES] = {0.0f};
-    for (uint32_t d = 0u; d < states; d += 4u) {
-        const uint32_t from = ((states > 4u) && ((states - d) < 4u)) ? (states - 4u) : d;
-        const float *x = &f->x[((size_t)from * f->stride) + first];
-        pfl_lanes_sum(row, x, near * f->stride, far * f->stride, (uint32_t)PFL_CEIL8(n));
-    }
-    return !pfl_is_finite(pfl_lane_sum(row));
+    return !pfl_is_finite(pfl_lanes_sum(&f->x[first], f->stride, f->config->states, (uint32_t)PFL_CEIL8(n)));
 }
 
 /* Non-finite particles take the state of the most likely one, which is finite, and lose their weight. */

@@ -1,11 +1,12 @@
 /* Seeding and jumps of the xoshiro128++ streams, and single draws. The normals have a file of their own. */
 #include "pflight/rng.h"
 
+#include "bits.h"
 #include "rng_kernels.h"
 
 /* SplitMix64 (Steele, Lea and Flood 2014): spreads any seed over 64 bits. Each step after the addition is invertible and
  * maps zero to zero, so that of two successive numbers one at most is zero: no seed makes a dead stream. */
-static uint64_t splitmix64(uint64_t *state)
+PFL_NOINLINE static uint64_t splitmix64(uint64_t *state)
 {
     *state += 0x9E3779B97F4A7C15u;
     uint64_t z = *state;

@@ -24,9 +24,9 @@ static void products(float *rows, const float *w, const float *x, uint32_t strid
     pfl_lanes_products(rows, w, x, stride, centres, n);
 }
 
-static void sum(float *row, const float *x, size_t near, size_t far, uint32_t n)
+static float sum(const float *x, size_t stride, uint32_t columns, uint32_t n)
 {
-    pfl_lanes_sum(row, x, near, far, n);
+    return pfl_lanes_sum(x, stride, columns, n);
 }
 
 const lanes_form_t FORM = {PFL_VECTOR_LANES, weight_of, weigh, product, products, sum};

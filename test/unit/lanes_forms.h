@@ -11,7 +11,7 @@ typedef struct {
     void (*weigh)(float *rows, float *w, const float *s, float top, uint32_t n);
     void (*product)(float *row, const float *w, const float *x, const float *centre, uint32_t n);
     void (*products)(float *rows, const float *w, const float *x, uint32_t stride, const float *centres, uint32_t n);
-    void (*sum)(float *row, const float *x, size_t near, size_t far, uint32_t n);
+    float (*sum)(const float *x, size_t stride, uint32_t columns, uint32_t n);
 } lanes_form_t;
 
 extern const lanes_form_t lanes_scalar;
