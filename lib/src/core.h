@@ -184,7 +184,7 @@ float pfl_worst_ratio(const pfl_t *f); /* of the sensors' test ratios */
 
 /* scrub.c */
 uint32_t pfl_mend_log_weights(pfl_t *f); /* such as no update can have written count as no weight; how many */
-bool pfl_revive_random(pfl_t *f); /* seeds dead streams anew; true when there were such */
+bool pfl_revive_random(pfl_t *f);        /* seeds dead streams anew; true when there were such */
 
 /* reset.c */
 void pfl_reinject(pfl_t *f, uint32_t sensor, const void *z);

@@ -32,7 +32,8 @@ pfl_status_t pfl_health(const pfl_t *f, pfl_health_t *out)
     out->t_us = f->t_us;
     out->t_fused_us = f->t_fused_us;
     out->ess = f->ess;
-    out->test_ratio = (intact == PFL_OK) ? pfl_worst_ratio(f) : f->test_ratio; /* sensors by a sound configuration only */
+    out->test_ratio =
+        (intact == PFL_OK) ? pfl_worst_ratio(f) : f->test_ratio; /* sensors by a sound configuration only */
     out->best_loglik = f->watched.best_loglik;
     out->phase = (pfl_phase_t)f->watched.phase;
     out->fault = f->watched.fault;
@@ -91,6 +92,6 @@ pfl_status_t pfl_record(const pfl_t *f, pfl_record_t *out)
     out->event = (uint16_t)f->watched.event;
     out->reject = (uint16_t)(f->watched.reject & 0xFFFFu);
     out->state = (uint8_t)((f->watched.phase & 0xFu) | ((mode_of(f) & 0xFu) << 4));
-    out->ratio = (ratio < 255.0f) ? (uint8_t)ratio : (uint8_t)255u;
+    out->ratio = (uint8_t)((ratio < 255.0f) ? (uint32_t)ratio : 255u);
     return PFL_OK;
 }
