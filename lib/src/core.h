@@ -109,6 +109,8 @@ struct pfl {
     uint32_t seal;                 /* hash of all above, between calls */
     uint32_t open;                 /* during a call */
     uint32_t copy[PFL_COPY_WORDS]; /* of all above, between calls */
+    pfl_config_t kept;             /* the configuration as it was, for the rest of a call in which it changes ... */
+    pfl_watch_t kept_watch;        /* ... and the limits of its watch */
     pfl_rng_t rng;                 /* unguarded: any state but zero is as good as any other */
 };
 
@@ -174,9 +176,12 @@ typedef enum {
     WATCH_RESET    /* or reinjected */
 } pfl_watch_call_t;
 
+bool pfl_guard_watch_is_whole(pfl_t *f); /* guard.c: it may have changed while callbacks ran */
+
 static inline pfl_status_t pfl_watch_tell(pfl_t *f, pfl_watch_call_t what, uint32_t number, const void *z)
 {
-    return (f->config->watch != NULL) ? f->config->watch->keep(f, (uint32_t)what, number, z) : PFL_OK;
+    const bool told = (f->config->watch != NULL) && pfl_guard_watch_is_whole(f);
+    return told ? f->config->watch->keep(f, (uint32_t)what, number, z) : PFL_OK;
 }
 
 /* health.c */

@@ -239,7 +239,8 @@ static pfl_status_t update(pfl_t *f, uint16_t sensor, uint64_t t_us, const void 
         return misfit(f, news);
     }
     pfl_meter_resume(f);
-    const pfl_status_t status = (news == PFL_OK) ? fuse(f, &f->config->sensors[sensor], z) : news;
+    const pfl_sensor_t now = f->config->sensors[sensor]; /* whatever becomes of it while its callback runs */
+    const pfl_status_t status = (news == PFL_OK) ? fuse(f, &now, z) : news;
     if (status >= PFL_OK) {
         f->watched.reject &= ~(1u << sensor);
         (void)pfl_watch_tell(f, WATCH_FUSED, sensor, z);

@@ -61,7 +61,7 @@ static uint32_t hash_of_limits(uint32_t hash, const pfl_config_t *c)
 }
 
 /* In steps: a damaged pointer must not be followed. */
-static bool config_is_intact(const pfl_t *f)
+bool pfl_guard_config_is_intact(const pfl_t *f)
 {
     if (PFL_GUARD_CONFIG == 0) {
         return true;
@@ -115,8 +115,66 @@ static void mend_constants(pfl_t *f)
     }
 }
 
+/* ---- A configuration that changes during a call ---------------------------------------------------------------- */
+
+#define KEEPS ((PFL_GUARD_CONFIG != 0) && (PFL_GUARD_CONTROL != 0))
+
+static bool differ(const void *a, const void *b, size_t bytes)
+{
+    uintptr_t different = 0u;
+    for (size_t at = 0u; at < bytes; at += sizeof different) {
+        uintptr_t x;
+        uintptr_t y;
+        PFL_COPY(&x, (const void *)((const unsigned char *)a + at), sizeof x);
+        PFL_COPY(&y, (const void *)((const unsigned char *)b + at), sizeof y);
+        different |= x ^ y;
+    }
+    return different != 0u;
+}
+
+static void keep_config(pfl_t *f)
+{
+    f->kept = *f->config;
+    if (f->config->watch != NULL) {
+        f->kept_watch = *f->config->watch;
+    }
+}
+
+/* The caller's configuration again, whose pointer lies in the copy: what is wrong with it the next call tells. */
+static void return_config(pfl_t *f)
+{
+    if (f->config == &f->kept) {
+        PFL_COPY(&f->config, (const void *)((const unsigned char *)f->copy + offsetof(struct pfl, config)),
+                 sizeof f->config);
+    }
+}
+
+/* The call goes on with the one it began with; or that one was damaged. */
+static void check_config(pfl_t *f)
+{
+    if (differ(f->config, &f->kept, sizeof f->kept)) {
+        if (pfl_guard_config_is_intact(f)) {
+            keep_config(f);
+        } else {
+            f->config = &f->kept;
+        }
+    }
+}
+
+bool pfl_guard_watch_is_whole(pfl_t *f)
+{
+    if (KEEPS && differ(f->config->watch, &f->kept_watch, sizeof f->kept_watch)) {
+        if ((f->config == &f->kept) || !pfl_guard_config_is_intact(f)) {
+            return false;
+        }
+        keep_config(f);
+    }
+    return true;
+}
+
 void pfl_guard_after_callback(pfl_t *f)
 {
+    return_config(f);
     const unsigned char *now = (const unsigned char *)f;
     const unsigned char *kept = (const unsigned char *)f->copy;
     uintptr_t different = 0u;
@@ -130,16 +188,23 @@ void pfl_guard_after_callback(pfl_t *f)
     if (different != 0u) {
         mend_constants(f);
     }
+    if (KEEPS) {
+        check_config(f);
+    }
 }
 
 void pfl_guard_after_batches(pfl_t *f)
 {
     uint32_t different = 0u;
+    return_config(f);
     for (size_t k = 0u; (PFL_GUARD_CONTROL != 0) && (k < CONSTANT_WORDS); k++) {
         different |= word_at(f, k) ^ word_at(f->copy, k);
     }
     if (different != 0u) {
         mend_constants(f);
+    }
+    if (KEEPS) {
+        check_config(f);
     }
 }
 
@@ -221,6 +286,7 @@ void pfl_guard_start(pfl_t *f)
     f->config_hash = hash_words(1u, f->config, sizeof *f->config / 4u);
     f->parts_hash = hash_of_parts(f->config_hash, f->config);
     f->limits_hash = hash_of_limits(f->config_hash, f->config);
+    keep_config(f);
     set_canaries(f);
     seal(f);
 }
@@ -231,7 +297,7 @@ pfl_status_t pfl_guard_look(const pfl_t *f)
     if (damage != INTACT) {
         return PFL_ERR_CORRUPT;
     }
-    return config_is_intact(f) ? PFL_OK : PFL_ERR_CONFIG;
+    return pfl_guard_config_is_intact(f) ? PFL_OK : PFL_ERR_CONFIG;
 }
 
 pfl_status_t pfl_guard_open(pfl_t *f)
@@ -243,7 +309,7 @@ pfl_status_t pfl_guard_open(pfl_t *f)
     if (damage == MENDABLE) {
         mend_block(f);
     }
-    if (!config_is_intact(f)) {
+    if (!pfl_guard_config_is_intact(f)) {
         f->watched.fault |= PFL_FAULT_CONFIG;
         seal(f);
         return PFL_ERR_CONFIG;
@@ -264,6 +330,7 @@ pfl_status_t pfl_guard_close(pfl_t *f, pfl_status_t status)
         pfl_count(&f->mended, 1u);
         answer = pfl_fault(f, PFL_ERR_CORRUPT);
     }
+    return_config(f);
     seal(f);
     return answer;
 }

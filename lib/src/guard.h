@@ -41,9 +41,12 @@ pfl_status_t pfl_guard_close(pfl_t *f, pfl_status_t status);
 void pfl_guard_start(pfl_t *f);
 
 /* What callbacks must not see changed is taken from the copy where it was: after each callback what the loop over the
- * batches lives on, and after the last one all of it. */
+ * batches lives on, the configuration among it, and after the last one all of it. */
 void pfl_guard_after_callback(pfl_t *f);
 void pfl_guard_after_batches(pfl_t *f);
+
+/* All of the configuration, as at the start of a call. */
+bool pfl_guard_config_is_intact(const pfl_t *f);
 
 /* What a log-likelihood callback may read, and write: a bay of the workspace whose first and last number are NaN, so that
  * one who stops early, or does nothing, is found out. */

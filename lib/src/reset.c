@@ -72,7 +72,7 @@ static void redraw(pfl_t *f, const pfl_sensor_t *sensor, const void *z, const pf
 void pfl_reinject(pfl_t *f, uint32_t sensor, const void *z)
 {
     const pfl_sensor_t *s = &f->config->sensors[sensor];
-    if ((s->redraw == NULL) && (f->config->draw == NULL)) {
+    if (((s->redraw == NULL) && (f->config->draw == NULL)) || !pfl_guard_config_is_intact(f)) {
         return;
     }
     const uint32_t count = f->config->particles;

@@ -36,7 +36,7 @@ extern "C" {
 
 #define PFL_CEIL8(n) ((((size_t)(n)) + 7u) & ~(size_t)7u)
 #define PFL_MAX(a, b) (((a) > (b)) ? (a) : (b))
-#define PFL_CONTROL_BYTES 1088u /* room for the control block and its copy, checked when the library is compiled */
+#define PFL_CONTROL_BYTES 1312u /* room for the control block and its copy, checked when the library is compiled */
 #define PFL_CANARY_FLOATS 8u
 #define PFL_STRIDE(n) PFL_CEIL8((size_t)(n) + 1u) /* floats of a column: one canary at least */
 #define PFL_MOMENT_FLOATS(d) (PFL_CEIL8((5u * (size_t)(d)) + ((size_t)(d) * ((size_t)(d) + 1u))))
