@@ -106,6 +106,62 @@ void test_C1_every_flipped_bit_of_configuration_sensors_and_watch_is_seen_before
     TEST_ASSERT_EQUAL_INT(PFL_OK, ft_cycle(&t, 0.0f));
 }
 
+/* A bit of configuration, sensors or watch flips while a callback runs: the call ends as it would have. */
+static size_t config_bit;
+static bool config_armed;
+
+static void strike_config(void)
+{
+    flip(&t, config_bit); /* watch, sensors and configuration lie at its front */
+    config_armed = false;
+}
+
+static void flipping_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p)
+{
+    ut_linear_predict(user, u, dt_s, p);
+    if (config_armed && ((config_bit % 2u) == 0u)) {
+        strike_config();
+    }
+}
+
+static void flipping_loglik(void *user, const void *z, const pfl_view_t *p, float *ll)
+{
+    ut_linear_loglik(user, z, p, ll);
+    if (config_armed && (p->first == 0u)) {
+        strike_config();
+    }
+}
+
+void test_C1_any_bit_flipped_while_a_callback_runs_is_survived_and_told(void)
+{
+    static ft_t rom;
+    const float z = 0.1f;
+    ft_configure(&t);
+    t.config.predict = flipping_predict;
+    t.sensors[0].loglik = flipping_loglik;
+    config_armed = false;
+    ft_start(&t);
+    ft_cycles(&t, 5u, 0.0f);
+    uint32_t told = 0u;
+    for (config_bit = 0u; config_bit < (8u * offsetof(ft_t, f)); config_bit++) {
+        rom = t;
+        t.now_us += FT_STEP_US;
+        config_armed = true;
+        pfl_status_t moved = pfl_predict(t.f, t.now_us, NULL);
+        config_armed = config_armed && (moved == PFL_OK);
+        (void)pfl_update(t.f, 0u, t.now_us, &z);
+        float mean[2];
+        told += (pfl_estimate(t.f, mean, NULL) == PFL_ERR_CONFIG) ? 1u : 0u;
+        config_armed = false;
+        t.watch = rom.watch;
+        t.config = rom.config;
+        memcpy(t.sensors, rom.sensors, sizeof t.sensors);
+        (void)ft_finite_mean(t.f);
+        TEST_ASSERT_TRUE(pfl_invariants_hold(t.f));
+    }
+    TEST_ASSERT_TRUE(told > (7u * offsetof(ft_t, f))); /* all but the padding of the structures */
+}
+
 /* ---- C2 ----------------------------------------------------------------------------------------------------------- */
 
 void test_C2_wrong_configurations_are_refused(void)

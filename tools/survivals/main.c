@@ -20,10 +20,10 @@ static bool number_of(const char *text, uint64_t *number)
 
 static void print_run(uint64_t run_seed, const judgement_t *j)
 {
-    printf("%" PRIu64 "|%s|%s|%s|%s|%d%d%d%d%d%d|%d|%.4g|%.4f\n", run_seed, region_name(fault.region),
+    printf("%" PRIu64 "|%s|%s|%s|%s|%d%d%d%d%d%d%d|%d|%.4g|%.4f\n", run_seed, region_name(fault.region),
            fault_kind_name(&fault), j->kind == WORLD_LAND ? "land" : "gps", class_name(j->verdict),
            j->nonfinite ? 1 : 0, j->fence ? 1 : 0, j->second ? 1 : 0, j->lie ? 1 : 0, j->late ? 1 : 0,
-           j->usable ? 1 : 0, fault_lasts(&fault) ? 1 : 0, j->ratio, j->work);
+           j->usable ? 1 : 0, fault_state.struck ? 1 : 0, fault_lasts(&fault) ? 1 : 0, j->ratio, j->work);
     (void)fflush(stdout);
 }
 
