@@ -11,30 +11,68 @@ fault_state_t fault_state;
 
 /* ---- Names ---------------------------------------------------------------------------------------------------------- */
 
-static const char *const region_names[REGIONS] = {
-    "configuration", "control block", "copy and seal", "sensor tracks", "particles", "log-weights", "workspace, moments",
-    "random streams", "canaries", "snapshot", "callbacks", "sensors", "time", "cycle counter", "budget"};
+static const char *const region_names[REGIONS] = {"configuration",
+                                                  "control block",
+                                                  "copy and seal",
+                                                  "sensor tracks",
+                                                  "particles",
+                                                  "log-weights",
+                                                  "workspace, moments",
+                                                  "random streams",
+                                                  "canaries",
+                                                  "snapshot",
+                                                  "callbacks",
+                                                  "sensors",
+                                                  "time",
+                                                  "cycle counter",
+                                                  "budget"};
 
 enum { DAMAGE_BIT, DAMAGE_TWO_BITS, DAMAGE_BURST, DAMAGE_STUCK, DAMAGE_ZEROED, DAMAGES };
 static const char *const damage_names[DAMAGES] = {"one bit", "two bits", "burst of 8", "stuck word", "zeroed column"};
 
 enum { BLOB_BIT, BLOB_BURST, BLOB_TRUNCATED, BLOB_VERSION, BLOB_SWAPPED, BLOB_ZEROED, BLOBS };
-static const char *const blob_names[BLOBS] = {"one bit", "burst of 8", "truncated", "other version", "other endianness", "zeroed part"};
+static const char *const blob_names[BLOBS] = {"one bit",       "burst of 8",       "truncated",
+                                              "other version", "other endianness", "zeroed part"};
 
 enum {
-    CALL_LL_NAN, CALL_LL_INF, CALL_LL_MINUS_INF, CALL_LL_POSITIVE, CALL_LL_SHORT, CALL_LL_LONG, CALL_LL_ONE_NAN,
-    CALL_X_NAN, CALL_X_ALL_NAN, CALL_X_INF, CALL_X_BEHIND, CALL_X_CONST, CALL_REENTER, CALLS
+    CALL_LL_NAN,
+    CALL_LL_INF,
+    CALL_LL_MINUS_INF,
+    CALL_LL_POSITIVE,
+    CALL_LL_SHORT,
+    CALL_LL_LONG,
+    CALL_LL_ONE_NAN,
+    CALL_X_NAN,
+    CALL_X_ALL_NAN,
+    CALL_X_INF,
+    CALL_X_BEHIND,
+    CALL_X_CONST,
+    CALL_REENTER,
+    CALLS
 };
 static const char *const call_names[CALLS] = {
-    "log-likelihoods NaN", "log-likelihoods +inf", "log-likelihoods -inf", "log-likelihoods positive",
-    "log-likelihoods too few", "log-likelihoods too many", "one log-likelihood NaN", "one particle NaN",
-    "all particles NaN", "one particle infinite", "writes behind its column", "casts const away", "calls its own filter"};
+    "log-likelihoods NaN",     "log-likelihoods +inf",     "log-likelihoods -inf",     "log-likelihoods positive",
+    "log-likelihoods too few", "log-likelihoods too many", "one log-likelihood NaN",   "one particle NaN",
+    "all particles NaN",       "one particle infinite",    "writes behind its column", "casts const away",
+    "calls its own filter"};
 
-enum { SENSE_DROPOUT, SENSE_OUTLIER, SENSE_FROZEN, SENSE_BIAS, SENSE_DUPLICATE, SENSE_LATE, SENSE_FUTURE, SENSE_NAN, SENSES };
-static const char *const sense_names[SENSES] = {"dropout", "outlier", "frozen", "bias", "duplicate", "late", "from the future", "NaN"};
+enum {
+    SENSE_DROPOUT,
+    SENSE_OUTLIER,
+    SENSE_FROZEN,
+    SENSE_BIAS,
+    SENSE_DUPLICATE,
+    SENSE_LATE,
+    SENSE_FUTURE,
+    SENSE_NAN,
+    SENSES
+};
+static const char *const sense_names[SENSES] = {"dropout",   "outlier", "frozen",          "bias",
+                                                "duplicate", "late",    "from the future", "NaN"};
 
 enum { TIME_BACK, TIME_AHEAD, TIME_REPEAT, TIME_GAP, TIME_SET_BACK, TIME_SET_AHEAD, TIMES };
-static const char *const time_names[TIMES] = {"one stamp back", "one stamp ahead", "stands still", "gap", "set back for good", "set ahead for good"};
+static const char *const time_names[TIMES] = {"one stamp back",    "one stamp ahead",   "stands still", "gap",
+                                              "set back for good", "set ahead for good"};
 
 enum { COUNTER_STUCK, COUNTER_24_BIT, COUNTER_BACK, COUNTER_SLOW, COUNTER_FAST, COUNTER_RANDOM, COUNTERS };
 static const char *const counter_names[COUNTERS] = {"stuck", "24 bits wide", "jumps back", "slow", "fast", "any value"};
@@ -55,8 +93,10 @@ const char *region_name(region_t region)
 
 const char *fault_kind_name(const fault_t *f)
 {
-    static const char *const *const special[REGIONS - MEMORY_REGIONS] = {blob_names, call_names, sense_names, time_names, counter_names, budget_names};
-    return ((uint32_t)f->region < MEMORY_REGIONS) ? damage_names[f->kind] : special[(uint32_t)f->region - MEMORY_REGIONS][f->kind];
+    static const char *const *const special[REGIONS - MEMORY_REGIONS] = {blob_names, call_names,    sense_names,
+                                                                         time_names, counter_names, budget_names};
+    return ((uint32_t)f->region < MEMORY_REGIONS) ? damage_names[f->kind]
+                                                  : special[(uint32_t)f->region - MEMORY_REGIONS][f->kind];
 }
 
 /* ---- Drawing -------------------------------------------------------------------------------------------------------- */
@@ -68,7 +108,8 @@ static bool is_memory(const fault_t *f)
 
 bool fault_lasts(const fault_t *f)
 {
-    return (is_memory(f) && (f->kind == DAMAGE_STUCK)) || ((f->region == REGION_COUNTER) && (f->kind == COUNTER_24_BIT));
+    return (is_memory(f) && (f->kind == DAMAGE_STUCK)) ||
+           ((f->region == REGION_COUNTER) && (f->kind == COUNTER_24_BIT));
 }
 
 /* How many cycles a fault goes on: memory changes once, the rest for up to four seconds. */
@@ -115,7 +156,8 @@ fault_t fault_none(void)
 
 void fault_print(FILE *out, const fault_t *f)
 {
-    fprintf(out, "%s: %s, from cycle %u for %u", region_name(f->region), fault_kind_name(f), (unsigned)f->first, (unsigned)f->cycles);
+    fprintf(out, "%s: %s, from cycle %u for %u", region_name(f->region), fault_kind_name(f), (unsigned)f->first,
+            (unsigned)f->cycles);
     if (is_memory(f)) {
         fprintf(out, ", %s %u", f->inside ? "inside callback" : "between calls, place", (unsigned)f->point);
     }

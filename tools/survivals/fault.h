@@ -63,7 +63,7 @@ void fault_begin_cycle(uint32_t number, const instant_t *instant);
 void fault_between_calls(uint32_t place);
 void fault_in_predict(const pfl_batch_t *p);
 void fault_in_loglik(uint32_t sensor, const pfl_view_t *p, float *ll);
-uint32_t fault_clock(uint32_t us);    /* the hardware's clock as it reads now */
+uint32_t fault_clock(uint32_t us); /* the hardware's clock as it reads now */
 uint32_t fault_counter(uint32_t count);
 uint32_t fault_callback_cost(uint32_t particles);
 bool fault_asleep(void); /* the application does not run in this cycle */

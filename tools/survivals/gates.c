@@ -12,8 +12,13 @@
 
 typedef enum { NOTHING, KIDNAPPED, OUTLIERS, DROPOUT, FROZEN, LATE, DUPLICATE, TROUBLES } trouble_t;
 
-static const char *const trouble_names[TROUBLES] = {"no trouble", "kidnapped: 500 m aside", "20 % outliers of 100 sigma", "10 s without both receivers",
-                                                    "first receiver frozen, 20 s", "first receiver 1 s late, 20 s", "first receiver twice, 20 s"};
+static const char *const trouble_names[TROUBLES] = {"no trouble",
+                                                    "kidnapped: 500 m aside",
+                                                    "20 % outliers of 100 sigma",
+                                                    "10 s without both receivers",
+                                                    "first receiver frozen, 20 s",
+                                                    "first receiver 1 s late, 20 s",
+                                                    "first receiver twice, 20 s"};
 
 typedef struct {
     double square, square_after; /* over all, and over the last ten seconds */
@@ -29,7 +34,8 @@ static void kidnap(instant_t *instant)
     instant->truth[0] += 500.0f;
 }
 
-static void trouble_samples(trouble_t trouble, uint32_t k, instant_t now, const instant_t *past, host_random_t *random, instant_t *out)
+static void trouble_samples(trouble_t trouble, uint32_t k, instant_t now, const instant_t *past, host_random_t *random,
+                            instant_t *out)
 {
     const bool on = (k >= BEGIN) && (k < END);
     *out = now;
@@ -101,9 +107,10 @@ int gates_fly(uint32_t runs)
                 for (uint32_t flight = 0u; flight < runs; flight++) {
                     fly((world_kind_t)kind, (trouble_t)trouble, gates != 0u, flight, &score);
                 }
-                printf("%s|%s|%u|%.4f|%.4f|%u|%u|%u\n", kind == 0u ? "land" : "gps", trouble_names[trouble], (unsigned)gates,
-                       sqrt(score.square / (double)score.cycles), sqrt(score.square_after / (double)score.cycles_after),
-                       (unsigned)score.lies, (unsigned)score.lost, (unsigned)runs);
+                printf("%s|%s|%u|%.4f|%.4f|%u|%u|%u\n", kind == 0u ? "land" : "gps", trouble_names[trouble],
+                       (unsigned)gates, sqrt(score.square / (double)score.cycles),
+                       sqrt(score.square_after / (double)score.cycles_after), (unsigned)score.lies,
+                       (unsigned)score.lost, (unsigned)runs);
             }
         }
     }

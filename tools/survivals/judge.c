@@ -69,14 +69,15 @@ static void trace_cycle(FILE *out, uint32_t k, const cycle_t *c, const instant_t
 {
     static const char *const phases[6] = {"INIT", "CONVERGING", "TRACKING", "DEGRADED", "LOST", "SETTLING"};
     fprintf(out, "%4u %-10s error %8.2f sigma %6.2f %6.2f  status", (unsigned)k,
-            c->healthy ? phases[(uint32_t)c->health.phase % 6u] : "?", sqrt(judge_square(c, instant)), sqrt((double)c->cov[0]),
-            sqrt((double)c->cov[STATES + 1u]));
+            c->healthy ? phases[(uint32_t)c->health.phase % 6u] : "?", sqrt(judge_square(c, instant)),
+            sqrt((double)c->cov[0]), sqrt((double)c->cov[STATES + 1u]));
     for (uint32_t s = 0u; s < STATUSES; s++) {
         fprintf(out, " %d", (int)c->status[s]);
     }
-    fprintf(out, "  fault %03x reject %x mode %02x event %03x mended %u%s%s%s\n", (unsigned)c->health.fault, (unsigned)c->health.reject,
-            (unsigned)c->health.mode, (unsigned)c->health.event, (unsigned)c->health.mended,
-            judge_lies(c, instant) ? " OFF" : "", c->nonfinite ? " NONFINITE" : "", (k == fault.first) ? " <- fault" : "");
+    fprintf(out, "  fault %03x reject %x mode %02x event %03x mended %u%s%s%s\n", (unsigned)c->health.fault,
+            (unsigned)c->health.reject, (unsigned)c->health.mode, (unsigned)c->health.event, (unsigned)c->health.mended,
+            judge_lies(c, instant) ? " OFF" : "", c->nonfinite ? " NONFINITE" : "",
+            (k == fault.first) ? " <- fault" : "");
 }
 
 static bool fly_clean(world_kind_t kind, uint32_t flight, bool dearest)
@@ -103,7 +104,7 @@ static bool fly_clean(world_kind_t kind, uint32_t flight, bool dearest)
             r->square[k] = judge_square(&cycle, &r->at[k]);
             clean_rmse[kind] += (k >= WARM) ? (r->square[k] / (double)((CYCLES - WARM) * FLIGHTS)) : 0.0;
         }
-        lies = judge_lies(&cycle, &r->at[k]) ? (lies + 1u) : 0u;
+        lies = ((k >= WARM) && judge_lies(&cycle, &r->at[k])) ? (lies + 1u) : 0u;
         good = good && !cycle.nonfinite && (lies <= LIE_CYCLES);
     }
     if (!dearest) {

@@ -7,13 +7,13 @@
 
 #define RATE_HZ 10.0
 #define CYCLES 280u
-#define WARM 50u         /* cycles before a fault may begin: flown once */
-#define FAULT_FIRST 55u  /* first cycle that a fault may begin in */
-#define FAULT_LAST 85u   /* and the last */
-#define RECOVERY 100u    /* cycles that a filter has to recover */
-#define WINDOW 50u       /* cycles after them that its error is judged by */
-#define LIE_CYCLES 10u   /* a lie lasts for longer */
-#define FLIGHTS 16u      /* of each kind, over and over */
+#define WARM 50u        /* cycles before a fault may begin: flown once */
+#define FAULT_FIRST 55u /* first cycle that a fault may begin in */
+#define FAULT_LAST 85u  /* and the last */
+#define RECOVERY 100u   /* cycles that a filter has to recover */
+#define WINDOW 50u      /* cycles after them that its error is judged by */
+#define LIE_CYCLES 10u  /* a lie lasts for longer */
+#define FLIGHTS 16u     /* of each kind, over and over */
 
 typedef enum { CLASS_MASKED, CLASS_RECOVERED, CLASS_FLAGGED, CLASS_SILENT, CLASS_FATAL, CLASSES } class_t;
 

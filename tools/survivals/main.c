@@ -1,7 +1,7 @@
 /* pflight_survival: runs with one fault each, one line a run; one run cycle by cycle; flights with and without gates; a
  * long flight. tools/survival calls it. */
-#include "judge.h"
 #include "gates.h"
+#include "judge.h"
 #include "soak.h"
 
 #include <inttypes.h>
@@ -20,9 +20,10 @@ static bool number_of(const char *text, uint64_t *number)
 
 static void print_run(uint64_t run_seed, const judgement_t *j)
 {
-    printf("%" PRIu64 "|%s|%s|%s|%s|%d%d%d%d%d%d|%d|%.4g|%.4f\n", run_seed, region_name(fault.region), fault_kind_name(&fault),
-           j->kind == WORLD_LAND ? "land" : "gps", class_name(j->verdict), j->nonfinite ? 1 : 0, j->fence ? 1 : 0, j->second ? 1 : 0,
-           j->lie ? 1 : 0, j->late ? 1 : 0, j->usable ? 1 : 0, fault_lasts(&fault) ? 1 : 0, j->ratio, j->work);
+    printf("%" PRIu64 "|%s|%s|%s|%s|%d%d%d%d%d%d%d|%d|%.4g|%.4f\n", run_seed, region_name(fault.region),
+           fault_kind_name(&fault), j->kind == WORLD_LAND ? "land" : "gps", class_name(j->verdict),
+           j->nonfinite ? 1 : 0, j->fence ? 1 : 0, j->second ? 1 : 0, j->lie ? 1 : 0, j->late ? 1 : 0,
+           j->usable ? 1 : 0, fault_state.struck ? 1 : 0, fault_lasts(&fault) ? 1 : 0, j->ratio, j->work);
     (void)fflush(stdout);
 }
 
@@ -48,7 +49,8 @@ static int replay(uint64_t run_seed)
 static int show_clean(void)
 {
     for (uint32_t kind = 0u; kind < WORLDS; kind++) {
-        printf("%s|%.4f|%" PRIu64 "\n", kind == 0u ? "land" : "gps", judge_clean_rmse((world_kind_t)kind), judge_clean_work((world_kind_t)kind));
+        printf("%s|%.4f|%" PRIu64 "\n", kind == 0u ? "land" : "gps", judge_clean_rmse((world_kind_t)kind),
+               judge_clean_work((world_kind_t)kind));
     }
     return 0;
 }
@@ -72,7 +74,8 @@ int main(int argc, char **argv)
     if ((strcmp(argv[1], "gates") == 0) && (argc == 3)) {
         return gates_fly((uint32_t)a);
     }
-    const bool known = ((strcmp(argv[1], "clean") == 0) && (argc == 2)) || ((strcmp(argv[1], "runs") == 0) && (argc == 4)) ||
+    const bool known = ((strcmp(argv[1], "clean") == 0) && (argc == 2)) ||
+                       ((strcmp(argv[1], "runs") == 0) && (argc == 4)) ||
                        ((strcmp(argv[1], "replay") == 0) && (argc == 3));
     if (!known) {
         return usage();

@@ -13,6 +13,7 @@
 #define FENCE 0x5Au
 #define HASH_START 0xCBF29CE484222325u
 #define SCRUB_CYCLES 10u
+#define GAP_MOST_US 6000000u /* a stamp further ahead is not believed until it lasts */
 #define MISFITS_MOST 5u
 #define LOST_MOST_US 5000000u
 
@@ -122,10 +123,12 @@ static pfl_status_t start_filter(void)
     if ((bytes == 0u) || (bytes > ARENA_BYTES)) {
         return PFL_ERR_CONFIG;
     }
-    unsigned char *arena = (unsigned char *)plane.arena + (ARENA_BYTES - bytes); /* the second filter lies right behind */
+    unsigned char *arena =
+        (unsigned char *)plane.arena + (ARENA_BYTES - bytes); /* the second filter lies right behind */
     pfl_t *f = NULL;
     const pfl_status_t status = pfl_init(arena, bytes, &plane.settings.config, plane.now_us, &f);
     plane.f = (status == PFL_OK) ? f : NULL;
+    plane.flown_us = plane.now_us;
     return status;
 }
 
@@ -184,6 +187,7 @@ static void heed_time(pfl_status_t status)
     if (plane.misfits >= MISFITS_MOST) {
         plane.misfits = 0u;
         plane.resets++;
+        plane.flown_us = plane.now_us;
         (void)pfl_reset(plane.f, plane.now_us);
     }
 }
@@ -201,9 +205,13 @@ static void heed_phase(const cycle_t *cycle)
 
 static pfl_status_t predict_once(const instant_t *instant)
 {
+    if (plane.now_us > (plane.flown_us + GAP_MOST_US)) {
+        return PFL_ERR_GAP;
+    }
     const uint64_t before = blocks;
     const pfl_status_t status = pfl_predict(plane.f, plane.now_us, &instant->input);
     work += blocks - before;
+    plane.flown_us = (status >= PFL_OK) ? plane.now_us : plane.flown_us;
     return status;
 }
 

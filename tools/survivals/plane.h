@@ -19,7 +19,7 @@
 typedef struct {
     world_kind_t kind;
     double rate_hz;
-    bool gates;         /* gates, watch and redraw; without: a plain filter */
+    bool gates;           /* gates, watch and redraw; without: a plain filter */
     bool resample_always; /* the dearest flight that is possible without a fault */
 } plan_t;
 
@@ -34,8 +34,8 @@ typedef struct {
 /* The port's counter. */
 typedef struct {
     uint32_t count;
-    uint32_t mask; /* of what a read gives */
-    uint32_t step; /* a read adds this many */
+    uint32_t mask;         /* of what a read gives */
+    uint32_t step;         /* a read adds this many */
     uint32_t per_particle; /* and a callback that many for each particle */
 } counter_t;
 
@@ -61,17 +61,18 @@ typedef struct {
     pfl_t *f;
     pfl_t *b;
     counter_t counter;
-    uint32_t clock_us;   /* the hardware's clock, 32 bits */
-    uint64_t now_us;     /* and what the application makes of it */
+    uint32_t clock_us;     /* the hardware's clock, 32 bits */
+    uint64_t now_us;       /* and what the application makes of it */
     uint64_t second_us;    /* time of the second filter, which no fault touches */
     uint32_t sensors_live; /* bit k: sensor k hands its samples over */
     bool first_twice;      /* sensor 0 hands over each of them twice */
-    uint32_t misfits;    /* predicts in a row that answered a wrong time */
-    uint64_t lost_since; /* 0: not lost */
-    uint64_t hash_a;     /* of every estimate so far */
+    uint64_t flown_us;     /* time of the last predict */
+    uint32_t misfits;      /* predicts in a row that answered a wrong time */
+    uint64_t lost_since;   /* 0: not lost */
+    uint64_t hash_a;       /* of every estimate so far */
     uint64_t hash_b;
-    uint32_t restarts, resets;         /* that the application made */
-    unsigned char blob[16384];           /* the last snapshot */
+    uint32_t restarts, resets; /* that the application made */
+    unsigned char blob[16384]; /* the last snapshot */
     size_t blob_bytes;
 } plane_t;
 

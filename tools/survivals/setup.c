@@ -129,7 +129,8 @@ static void set_sensors(settings_t *s, const plan_t *plan)
 {
     const bool land = plan->kind == WORLD_LAND;
     const pfl_loglik_fn look[SENSORS] = {first_fix, second_fix, land ? land_velocity : gps_velocity};
-    const void *user[SENSORS] = {&positions[0], &positions[1], land ? (const void *)&course : (const void *)&components};
+    const void *user[SENSORS] = {&positions[0], &positions[1],
+                                 land ? (const void *)&course : (const void *)&components};
     for (uint32_t k = 0u; k < SENSORS; k++) {
         s->sensors[k].loglik = look[k];
         s->sensors[k].user = parameters(user[k]);
@@ -165,6 +166,7 @@ void setup_filter(settings_t *s, const plan_t *plan)
     set_limits(s, land);
     s->watch.ok_sigma = s->ok_sigma;
     s->watch.reinject = 0.3f;
+    s->watch.lost_rejects = 10u; /* a second: outliers do not come ten in a row */
     s->watch.keep = pfl_watch_keep;
     pfl_config_t *c = &s->config;
     c->abi = PFL_ABI;
@@ -174,7 +176,6 @@ void setup_filter(settings_t *s, const plan_t *plan)
     c->sensor_count = SENSORS;
     c->ess_ratio = plan->resample_always ? 1.0f : 0.5f;
     c->seed = 12345u;
-    c->dt_max_us = 250000u;
     c->budget_cycles = 40000u;
     c->lo = s->lo;
     c->hi = s->hi;

@@ -51,11 +51,13 @@ static int fly(world_kind_t kind, double hours)
     }
     const pfl_health_t *h = &cycle.health;
     const bool sane = (h->fused + h->rejected == 3u * cycles) && (h->faulted == 0u) && (h->mended == 0u) &&
-                      (h->quarantined == 0u) && (h->overruns == 0u) && pfl_invariants_hold(plane.f) && plane_fences_stand();
+                      (h->quarantined == 0u) && (h->overruns == 0u) && pfl_invariants_hold(plane.f) &&
+                      plane_fences_stand();
     printf("%s|%" PRIu64 "|%" PRIu64 "|%.6f|%.6f|%" PRIu64 "|%" PRIu64 "|%u|%.4f|%d|%016" PRIx64 "\n",
-           kind == WORLD_LAND ? "land" : "gps", cycles, tally.critical, (double)tally.refused / (3.0 * (double)tally.cycles),
-           (double)tally.degraded / (double)tally.cycles, tally.lies, tally.nonfinite, (unsigned)h->resets,
-           sqrt(tally.square / (double)tally.cycles), sane ? 1 : 0, plane.hash_a);
+           kind == WORLD_LAND ? "land" : "gps", cycles, tally.critical,
+           (double)tally.refused / (3.0 * (double)tally.cycles), (double)tally.degraded / (double)tally.cycles,
+           tally.lies, tally.nonfinite, (unsigned)h->resets, sqrt(tally.square / (double)tally.cycles), sane ? 1 : 0,
+           plane.hash_a);
     return 0;
 }
 

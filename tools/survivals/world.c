@@ -71,7 +71,8 @@ static void observe(world_t *world, instant_t *instant)
 
 void world_step(world_t *world, instant_t *instant)
 {
-    const pfl_land_input_t input = {0.3f + (0.1f * (float)sin(0.2 * world->t_s)), 0.03f + (0.02f * (float)sin(0.3 * world->t_s))};
+    const pfl_land_input_t input = {0.3f + (0.1f * (float)sin(0.2 * world->t_s)),
+                                    0.03f + (0.02f * (float)sin(0.3 * world->t_s))};
     instant->input = input;
     if (world->kind == WORLD_LAND) {
         drive(world, &input);
