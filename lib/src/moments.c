@@ -197,15 +197,15 @@ PFL_NOINLINE static void finish(const pfl_t *f, float *mean, float *cov)
     }
 }
 
-/* Sum of the weights and effective sample size. */
+/* Sum of the weights and effective sample size. That is at least one in float too: the heaviest weight is in both sums,
+ * and what the others lose to rounding in the sum they do not add to the squares either. */
 static void finish_weights(pfl_t *f)
 {
     const float sum = row_sum(f, ROW_WEIGHT);
     const float ess = (sum * sum) / row_sum(f, ROW_SQUARE);
     const float count = (float)f->config->particles;
-    const float at_least_one = (ess < 1.0f) ? 1.0f : ess;
     f->weight_sum = sum;
-    f->ess = (at_least_one > count) ? count : at_least_one;
+    f->ess = (ess > count) ? count : ess;
     f->scratch_is_weights = 1u;
 }
 
@@ -225,12 +225,17 @@ void pfl_set_best(pfl_t *f, uint32_t first)
 /* What a pass does with each batch: the padding belongs to the last one. */
 typedef enum { PASS_WEIGHTS = 1, PASS_CIRCLES = 2, PASS_STATES = 4 } pass_t;
 
-/* One sweep over the particles; false when the budget ran out. Where neither budget nor work columns ask for batches
- * longer pieces save some overhead. */
-static bool sweep(pfl_t *f, bool budgeted, uint32_t passes)
+/* Where neither budget nor work columns ask for batches longer pieces save some overhead. */
+static uint32_t piece_of(const pfl_t *f, uint32_t passes)
 {
     const bool in_batches = (f->config->budget_cycles != 0u) || is_full(f) || ((passes & PASS_CIRCLES) != 0u);
-    const uint32_t piece = in_batches ? PFL_BATCH : LONG_PIECE;
+    return in_batches ? PFL_BATCH : LONG_PIECE;
+}
+
+/* One sweep over the particles; false when the budget ran out. */
+static bool sweep(pfl_t *f, bool budgeted, uint32_t passes)
+{
+    const uint32_t piece = piece_of(f, passes);
     const uint32_t padded = pfl_padded(f);
     pfl_weights_settle(f);
     for (uint32_t first = 0u; first < padded; first += piece) {

@@ -391,8 +391,7 @@ void pfl_resample_now(pfl_t *f)
     case PFL_RESAMPLE_MULTINOMIAL:
         count_multinomial(f);
         break;
-    case PFL_RESAMPLE_SYSTEMATIC:
-    default:
+    default: /* PFL_RESAMPLE_SYSTEMATIC */
         count_systematic(f);
         break;
     }
