@@ -197,15 +197,15 @@ PFL_NOINLINE static void finish(const pfl_t *f, float *mean, float *cov)
     }
 }
 
-/* Sum of the weights and effective sample size. That is at least one in float too: the heaviest weight is in both sums,
- * and what the others lose to rounding in the sum they do not add to the squares either. */
+/* Sum of the weights and effective sample size. */
 static void finish_weights(pfl_t *f)
 {
     const float sum = row_sum(f, ROW_WEIGHT);
     const float ess = (sum * sum) / row_sum(f, ROW_SQUARE);
     const float count = (float)f->config->particles;
+    const float at_least_one = (ess >= 1.0f) ? ess : 1.0f; /* never NaN */
     f->weight_sum = sum;
-    f->ess = (ess > count) ? count : ess;
+    f->ess = (at_least_one > count) ? count : at_least_one;
     f->scratch_is_weights = 1u;
 }
 
