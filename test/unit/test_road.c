@@ -315,7 +315,7 @@ void test_filter_stays_on_the_road_with_bounded_draws(void)
     } arena;
 
     for (uint32_t t = 0u; t < 3u; t++) {
-        const pfl_constraint_t road = {pfl_ring_inside, pfl_ring_slide, &ring, tries[t], pfl_constraint_keep};
+        const pfl_constraint_t road = {pfl_ring_inside, pfl_ring_slide, &ring, tries[t], 0u, pfl_constraint_keep};
         const pfl_config_t config = {
             .abi = PFL_ABI,
             .particles = N,
