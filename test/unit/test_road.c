@@ -76,6 +76,9 @@ void test_bounce_reverses_and_clamp_leaves_the_speed(void)
     set(0u, 0.0f, -90.0f, 3.0f, 4.0f);
     pfl_ring_bounce(&ring, &p);
     expect(0u, 0.0, -96.0, 3.0, -4.0, 1e-4);
+    set(0u, 101.0f, 0.0f, 0.25f, 4.0f); /* slowly, too */
+    pfl_ring_bounce(&ring, &p);
+    expect(0u, 100.0, 0.0, -0.25, 4.0, 1e-4);
     set(0u, 101.0f, 0.0f, 3.0f, 4.0f);
     pfl_ring_clamp(&ring, &p);
     expect(0u, 100.0, 0.0, 3.0, 4.0, 1e-4);
