@@ -59,7 +59,7 @@ static void loglik(void *user, const void *z, const pfl_view_t *p, float *ll)
     }
 }
 
-static const pfl_sensor_t sensor = {.loglik = loglik};
+static const pfl_sensor_t sensor = {loglik, NULL, 0.0f};
 static const pfl_kernel_t kernel = {0.3f, 0u};
 
 static void make_shape(shape_t *s, uint32_t k)
