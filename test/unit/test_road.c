@@ -126,6 +126,14 @@ void test_inside_knows_both_edges(void)
     TEST_ASSERT_EQUAL_UINT32(0u, inside[3]);
 }
 
+void test_inside_writes_no_more_than_its_batch(void)
+{
+    const pfl_view_t view = {x[0], PFL_BATCH, 0u, 3u};
+    inside[3] = 77u;
+    pfl_ring_inside(&ring, &view, inside);
+    TEST_ASSERT_EQUAL_UINT32(77u, inside[3]);
+}
+
 void test_nearest_point_of_the_ring(void)
 {
     float px = 200.0f;
