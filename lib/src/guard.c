@@ -11,11 +11,16 @@
 #define OPEN 0x6F70656Eu     /* "open": a call is in progress, and the block may differ from its copy */
 #define SENTINEL 0x3F8CAFE5u /* a float near 1.1: harmless where sums run over the padding */
 
+#define CONFIG_WORDS ((offsetof(pfl_config_t, user) + sizeof(void *)) / 4u) /* 32-bit machines pad behind it */
 #define SEALED_WORDS (offsetof(struct pfl, seal) / 4u)
 #define SEALED_LONG_WORDS (offsetof(struct pfl, seal) / sizeof(uintptr_t))
 #define CONSTANT_WORDS (offsetof(struct pfl, reset_t_us) / 4u)
 #define LOOP_WORDS (offsetof(struct pfl, mean) / sizeof(uintptr_t))
 
+/* No byte without a name: what is only padding may differ from copy to copy of a structure. */
+typedef char pfl_sensor_has_no_gap[(sizeof(pfl_sensor_t) == ((3u * sizeof(void *)) + 16u)) ? 1 : -1];
+typedef char pfl_constraint_has_no_gap[(sizeof(pfl_constraint_t) == ((4u * sizeof(void *)) + 8u)) ? 1 : -1];
+typedef char pfl_watch_has_no_gap[(sizeof(pfl_watch_t) == ((2u * sizeof(void *)) + 24u)) ? 1 : -1];
 typedef char pfl_sealed_part_fits[(sizeof(uint32_t[SEALED_WORDS]) <= sizeof(((struct pfl *)0)->copy)) ? 1 : -1];
 
 static uint32_t word_at(const void *bytes, size_t k)
@@ -88,7 +93,7 @@ static bool config_is_intact(const pfl_t *f)
     if (PFL_GUARD_CONFIG == 0) {
         return true;
     }
-    const uint32_t hash = hash_words(1u, f->config, sizeof *f->config / 4u);
+    const uint32_t hash = hash_words(1u, f->config, CONFIG_WORDS);
     return (hash == f->config_hash) && (hash_of_parts(hash, f->config) == f->parts_hash) &&
            (hash_of_limits(hash, f->config) == f->limits_hash);
 }
@@ -244,7 +249,7 @@ PFL_NOINLINE static bool set_canaries(const pfl_t *f)
 
 void pfl_guard_start(pfl_t *f)
 {
-    f->config_hash = hash_words(1u, f->config, sizeof *f->config / 4u);
+    f->config_hash = hash_words(1u, f->config, CONFIG_WORDS);
     f->parts_hash = hash_of_parts(f->config_hash, f->config);
     f->limits_hash = hash_of_limits(f->config_hash, f->config);
     (void)set_canaries(f);

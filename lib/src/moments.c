@@ -166,12 +166,17 @@ void pfl_set_best(pfl_t *f, uint32_t first)
 /* What a pass does with each batch: the padding belongs to the last one. */
 typedef enum { PASS_WEIGHTS = 1, PASS_CIRCLES = 2, PASS_STATES = 4 } pass_t;
 
-/* One sweep over the particles; false when the budget ran out. Where neither budget nor work columns ask for batches
- * longer pieces save some overhead. */
-static bool sweep(pfl_t *f, bool budgeted, uint32_t passes)
+/* Where neither budget nor work columns ask for batches longer pieces save some overhead. */
+static uint32_t piece_of(const pfl_t *f, uint32_t passes)
 {
     const bool in_batches = (f->config->budget_cycles != 0u) || is_full(f) || ((passes & PASS_CIRCLES) != 0u);
-    const uint32_t piece = in_batches ? PFL_BATCH : LONG_PIECE;
+    return in_batches ? PFL_BATCH : LONG_PIECE;
+}
+
+/* One sweep over the particles; false when the budget ran out. */
+static bool sweep(pfl_t *f, bool budgeted, uint32_t passes)
+{
+    const uint32_t piece = piece_of(f, passes);
     const uint32_t padded = pfl_padded(f);
     pfl_weights_settle(f);
     for (uint32_t first = 0u; first < padded; first += piece) {

@@ -395,7 +395,7 @@ static void of_constraint_and_kernel(void)
     run_t run;
     begin(13u);
     for (size_t k = 0u; k < (sizeof tries / sizeof tries[0]); k++) {
-        const pfl_constraint_t ring = {ring_inside, ring_project, NULL, tries[k], pfl_constraint_keep};
+        const pfl_constraint_t ring = {ring_inside, ring_project, NULL, tries[k], 0u, pfl_constraint_keep};
         for (uint32_t n = 1u; n <= 300u; n += 99u) {
             mill_run(&run, n, 3u)->config.constraint = &ring;
             (void)fly(&run);

@@ -216,7 +216,7 @@ static void slow_loglik(void *user, const void *z, const pfl_view_t *p, float *l
 
 void test_B2_slow_callbacks_cost_their_cycle_only(void)
 {
-    static const uint32_t slow[3] = {600u, 3000u, 1000000u};
+    static const uint32_t slow[3] = {1200u, 3000u, 1000000u};
     ft_configure(&t);
     t.sensors[0].loglik = slow_loglik;
     t.config.budget_cycles = 1000u;

@@ -84,7 +84,7 @@ static pfl_t *fly(const pfl_config_t *config)
 /* From 0 half of the draws land outside: M draws leave about N / 2^M to be projected, and no others. */
 static void check_tries(uint32_t tries, uint32_t particles)
 {
-    const pfl_constraint_t constraint = {inside, project, NULL, tries, pfl_constraint_keep};
+    const pfl_constraint_t constraint = {inside, project, NULL, tries, 0u, pfl_constraint_keep};
     const pfl_config_t config = config_of(particles, &constraint);
     pfl_t *f = fly(&config);
     pfl_view_t view;
@@ -120,7 +120,7 @@ void test_draws_are_bounded_and_only_the_rest_is_projected(void)
 
 void test_nothing_inside_still_ends(void)
 {
-    const pfl_constraint_t constraint = {inside_nowhere, project, NULL, PFL_TRIES_MAX, pfl_constraint_keep};
+    const pfl_constraint_t constraint = {inside_nowhere, project, NULL, PFL_TRIES_MAX, 0u, pfl_constraint_keep};
     const pfl_config_t config = config_of(100u, &constraint);
     pfl_t *f = fly(&config);
     pfl_health_t health;
@@ -135,7 +135,7 @@ void test_nothing_inside_still_ends(void)
 void test_accepted_draws_follow_the_truncated_law(void)
 {
     const uint32_t n = 100000u;
-    const pfl_constraint_t constraint = {inside, project, NULL, 64u, pfl_constraint_keep};
+    const pfl_constraint_t constraint = {inside, project, NULL, 64u, 0u, pfl_constraint_keep};
     const pfl_config_t config = config_of(n, &constraint);
     pfl_t *f = fly(&config);
     pfl_view_t view;
@@ -152,7 +152,7 @@ void test_accepted_draws_follow_the_truncated_law(void)
 
 void test_retries_need_their_memory_and_a_single_draw_needs_none(void)
 {
-    pfl_constraint_t constraint = {inside, project, NULL, 2u, pfl_constraint_keep};
+    pfl_constraint_t constraint = {inside, project, NULL, 2u, 0u, pfl_constraint_keep};
     const pfl_config_t config = config_of(50u, &constraint);
     const size_t plain = PFL_ARENA_BYTES(50, 2, 1);
     pfl_t *f;
@@ -169,7 +169,7 @@ void test_retries_need_their_memory_and_a_single_draw_needs_none(void)
 
 void test_wrong_constraints_and_kernels_are_refused(void)
 {
-    pfl_constraint_t constraint = {inside, project, NULL, 0u, pfl_constraint_keep};
+    pfl_constraint_t constraint = {inside, project, NULL, 0u, 0u, pfl_constraint_keep};
     pfl_config_t config = config_of(8u, &constraint);
     const size_t bytes = PFL_ARENA_BYTES(8, 2, 1) + PFL_RETRY_BYTES(2);
     void *arena = ut_arena(bytes);
@@ -178,11 +178,11 @@ void test_wrong_constraints_and_kernels_are_refused(void)
     TEST_ASSERT_EQUAL_INT(PFL_ERR_CONFIG, pfl_init(arena, bytes, &config, 0u, &f));
     constraint.tries = PFL_TRIES_MAX + 1u;
     TEST_ASSERT_EQUAL_INT(PFL_ERR_CONFIG, pfl_init(arena, bytes, &config, 0u, &f));
-    constraint = (pfl_constraint_t){NULL, project, NULL, 1u, pfl_constraint_keep};
+    constraint = (pfl_constraint_t){NULL, project, NULL, 1u, 0u, pfl_constraint_keep};
     TEST_ASSERT_EQUAL_INT(PFL_ERR_CONFIG, pfl_init(arena, bytes, &config, 0u, &f));
-    constraint = (pfl_constraint_t){inside, NULL, NULL, 1u, pfl_constraint_keep};
+    constraint = (pfl_constraint_t){inside, NULL, NULL, 1u, 0u, pfl_constraint_keep};
     TEST_ASSERT_EQUAL_INT(PFL_ERR_CONFIG, pfl_init(arena, bytes, &config, 0u, &f));
-    constraint = (pfl_constraint_t){inside, project, NULL, 1u, NULL};
+    constraint = (pfl_constraint_t){inside, project, NULL, 1u, 0u, NULL};
     TEST_ASSERT_EQUAL_INT(PFL_ERR_CONFIG, pfl_init(arena, bytes, &config, 0u, &f));
     config.constraint = NULL;
     const pfl_kernel_t kernels[] = {{0.0f, 0u, pfl_kernel_move},  {1.0f, 0u, pfl_kernel_move},
@@ -342,7 +342,7 @@ void test_farthest_is_the_largest_distance(void)
 /* A fork has retry memory of its own: it draws anew there, and the original does not notice. */
 void test_a_fork_retries_in_its_own_memory(void)
 {
-    const pfl_constraint_t constraint = {inside, project, NULL, 8u, pfl_constraint_keep};
+    const pfl_constraint_t constraint = {inside, project, NULL, 8u, 0u, pfl_constraint_keep};
     const pfl_config_t config = config_of(100u, &constraint);
     pfl_t *f = fly(&config);
     const size_t bytes = pfl_arena_bytes(&config);
@@ -420,7 +420,7 @@ void test_a_fork_moves_its_kernel_in_its_own_memory(void)
 
 void test_a_restored_filter_has_the_counters_of_its_constraint(void)
 {
-    const pfl_constraint_t constraint = {inside, project, NULL, 2u, pfl_constraint_keep};
+    const pfl_constraint_t constraint = {inside, project, NULL, 2u, 0u, pfl_constraint_keep};
     const pfl_config_t config = config_of(100u, &constraint);
     pfl_t *f = fly(&config);
     pfl_t *other = fly(&config);

@@ -194,7 +194,7 @@ void test_lvfg_refuses_each_bad_number_alone(void)
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, lvfg_with(&good, pair, NULL, &standoff));
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, lvfg_with(&good, pair, &estimate, NULL));
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_lvfg_command(&good, pair, 2u, &estimate, &standoff, NULL));
-    for (uint32_t i = 0u; i < 8u; i++) {
+    for (uint32_t i = 0u; i < 11u; i++) {
         pfl_lvfg_t g = good;
         float *number[] = {&g.turn_gain,
                            &g.phase_gain,
@@ -203,8 +203,11 @@ void test_lvfg_refuses_each_bad_number_alone(void)
                            &g.limits.turn_max_radps,
                            &g.limits.speed_range_mps,
                            &g.limits.speed_range_mps,
+                           &g.limits.turn_max_radps,
+                           &g.limits.speed_range_mps,
+                           &g.limits.turn_max_radps,
                            &g.limits.turn_max_radps};
-        const float wrong[] = {nan, nan, (float)INFINITY, nan, nan, 15.0f, 0.0f, 0.0f};
+        const float wrong[] = {nan, nan, (float)INFINITY, nan, nan, 15.0f, 0.0f, 0.0f, -1.0f, -1.0f, (float)INFINITY};
         *number[i] = wrong[i];
         TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, lvfg_with(&g, pair, &estimate, &standoff));
     }

@@ -236,6 +236,9 @@ void test_a_watch_out_of_range_is_refused(void)
         TEST_ASSERT_EQUAL_INT(PFL_ERR_CONFIG, pfl_init(arena, bytes, &w.config, 0u, &f));
     }
     make_watched(&w);
+    w.watch.keep = NULL;
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_CONFIG, pfl_init(arena, bytes, &w.config, 0u, &f));
+    make_watched(&w);
     w.watch.ok_sigma = bad_sigma;
     TEST_ASSERT_EQUAL_INT(PFL_ERR_CONFIG, pfl_init(arena, bytes, &w.config, 0u, &f));
     make_watched(&w);

@@ -113,6 +113,7 @@ void test_without_a_measurement_only_the_driven_states_move(void)
     const pfl_batch_t other = {expected, N, noise, 0u, N};
     memcpy(expected, x, sizeof x);
     pfl_constant_velocity_predict(&still, NULL, DT_S, &other);
+    proposal.sigma_other[0] = 0.25f;
     proposal.sigma_other[1] = 0.0f;
     move(NULL);
     for (uint32_t i = 0u; i < N; i++) {

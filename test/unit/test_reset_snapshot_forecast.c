@@ -796,3 +796,25 @@ void test_a_visit_can_end_the_forecast(void)
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, forecast(f, &c, &h, NULL));
     TEST_ASSERT_EQUAL_UINT32(3u, looked.calls);
 }
+
+static void losing_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p)
+{
+    ut_linear_predict(user, u, dt_s, p);
+    PFL_STATE(p, 0)[p->n - 1u] = ut_nan(false);
+}
+
+/* A step that lost a few particles has a mean all the same. */
+void test_a_forecast_that_loses_particles_says_so_and_goes_on(void)
+{
+    pfl_config_t c = ut_linear_config(N);
+    const pfl_horizon_t h = {500000u, 3u, NULL, NULL, NULL, NULL};
+    c.predict = losing_predict;
+    pfl_t *f = ut_filter(&c);
+    for (uint32_t k = 0u; k < 6u; k++) {
+        path[k] = 1.0e9f;
+    }
+    TEST_ASSERT_EQUAL_INT(PFL_QUARANTINED, forecast(f, &c, &h, NULL));
+    for (uint32_t k = 0u; k < 6u; k++) {
+        TEST_ASSERT_TRUE((path[k] > -100.0f) && (path[k] < 100.0f));
+    }
+}

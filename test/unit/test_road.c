@@ -76,6 +76,9 @@ void test_bounce_reverses_and_clamp_leaves_the_speed(void)
     set(0u, 0.0f, -90.0f, 3.0f, 4.0f);
     pfl_ring_bounce(&ring, &p);
     expect(0u, 0.0, -96.0, 3.0, -4.0, 1e-4);
+    set(0u, 101.0f, 0.0f, 0.25f, 4.0f); /* slowly, too */
+    pfl_ring_bounce(&ring, &p);
+    expect(0u, 100.0, 0.0, -0.25, 4.0, 1e-4);
     set(0u, 101.0f, 0.0f, 3.0f, 4.0f);
     pfl_ring_clamp(&ring, &p);
     expect(0u, 100.0, 0.0, 3.0, 4.0, 1e-4);
@@ -121,6 +124,14 @@ void test_inside_knows_both_edges(void)
     TEST_ASSERT_EQUAL_UINT32(1u, inside[1]);
     TEST_ASSERT_EQUAL_UINT32(1u, inside[2]);
     TEST_ASSERT_EQUAL_UINT32(0u, inside[3]);
+}
+
+void test_inside_writes_no_more_than_its_batch(void)
+{
+    const pfl_view_t view = {x[0], PFL_BATCH, 0u, 3u};
+    inside[3] = 77u;
+    pfl_ring_inside(&ring, &view, inside);
+    TEST_ASSERT_EQUAL_UINT32(77u, inside[3]);
 }
 
 void test_nearest_point_of_the_ring(void)
@@ -315,7 +326,7 @@ void test_filter_stays_on_the_road_with_bounded_draws(void)
     } arena;
 
     for (uint32_t t = 0u; t < 3u; t++) {
-        const pfl_constraint_t road = {pfl_ring_inside, pfl_ring_slide, &ring, tries[t], pfl_constraint_keep};
+        const pfl_constraint_t road = {pfl_ring_inside, pfl_ring_slide, &ring, tries[t], 0u, pfl_constraint_keep};
         const pfl_config_t config = {
             .abi = PFL_ABI,
             .particles = N,

@@ -1,7 +1,7 @@
 /* The watch at its limits: each complaint alone, each limit of the configuration, reinjection without room or source,
  * a log-likelihood callback that writes too far, and what snapshots and forks keep of all that. White box where only
  * a damaged filter has what is to be tested. */
-#include "core.h"
+#include "guard.h"
 #include "support.h"
 
 #include "unity.h"
@@ -358,6 +358,31 @@ void test_a_snapshot_keeps_what_the_watch_knows(void)
     }
     const float z = 100.0f; /* known to both */
     TEST_ASSERT_EQUAL_INT(pfl_update(f, 0u, now_us, &z), pfl_update(g, 0u, now_us, &z));
+}
+
+/* No two words alike, so that each is missed. */
+void test_a_snapshot_keeps_every_counter(void)
+{
+    pfl_t *f = tracking();
+    uint32_t *const counters[] = {&f->fused,        &f->rejected,        &f->faulted,
+                                  &f->resampled,    &f->quarantined,     &f->resets,
+                                  &f->overruns,     &f->mended,          &f->redrawn,
+                                  &f->projected,    &f->watched.fault,   &f->watched.reject,
+                                  &f->watched.mode, &f->watched.event,   &f->watched.refused,
+                                  &f->watched.lean, &f->watched.settled, &f->watched.quarantined};
+    for (uint32_t k = 0u; k < (sizeof counters / sizeof counters[0]); k++) {
+        *counters[k] = 1000u + k;
+    }
+    f->reset_t_us = 0x123456789Au;
+    f->watched.since_us = 0x987654321u;
+    f->watched.phase = (uint32_t)PFL_PHASE_DEGRADED;
+    f->watched.best_loglik = -3.5f;
+    f->watched.ratio_before = 1.25f;
+    (void)pfl_guard_close(f, PFL_OK);
+    const unsigned char *kept = ut_snapshot(f);
+    pfl_t *g = ut_filter(&config);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_restore(g, kept, pfl_snapshot_bytes(g)));
+    TEST_ASSERT_TRUE(ut_same_bytes(kept, ut_snapshot(g), pfl_snapshot_bytes(g)));
 }
 
 void test_a_snapshot_whose_ratio_of_a_sensor_is_not_finite_is_refused(void)

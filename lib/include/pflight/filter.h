@@ -101,13 +101,14 @@ typedef void (*pfl_redraw_fn)(void *user, const void *z, const pfl_batch_t *part
 typedef struct {
     pfl_loglik_fn loglik;  /* not null */
     void *user;            /* handed to loglik; null: the configuration's */
+    pfl_redraw_fn redraw;  /* draws particles that agree with z, for reinjection; null: the configuration's draw */
     float gate;            /* refuse when -2 max_i ll_i > gate (a chi-square quantile for the measurement's dimension:
                              11.3 for 3 at 99 %); 0: no gate. Finite, >= 0 */
-    pfl_redraw_fn redraw;  /* draws particles that agree with z, for reinjection; null: the configuration's draw */
     uint32_t timeout_us;   /* with a watch: not fused for longer than this is stale, and degrades; 0: never */
     uint16_t z_bytes;      /* with a watch: size of *z, so that a measurement whose content stands still or comes twice
                               is seen; 0: not looked at */
     uint16_t frozen_after; /* refuse the same content from this repetition on; 0: never */
+    uint32_t unused;       /* 0: the guards look at every byte, so every byte has a name */
 } pfl_sensor_t;
 
 /* Which moments are computed after each update. */
@@ -145,7 +146,8 @@ typedef struct {
     pfl_inside_fn inside;   /* not null */
     pfl_project_fn project; /* not null */
     void *user;             /* handed to both; null: the configuration's */
-    uint32_t tries; /* 1 .. PFL_TRIES_MAX; 1 is constant time. More than 1 needs PFL_RETRY_BYTES(D) more arena */
+    uint32_t tries;  /* 1 .. PFL_TRIES_MAX; 1 is constant time. More than 1 needs PFL_RETRY_BYTES(D) more arena */
+    uint32_t unused; /* 0 */
     void (*keep)(pfl_t *f, const void *u, float dt_s, uint32_t first, uint32_t n); /* pfl_constraint_keep */
 } pfl_constraint_t;
 
@@ -182,6 +184,7 @@ typedef struct {
     float reinject;          /* when LOST, and a measurement is refused again: the share of the particles that is drawn
                                 anew, by the sensor's redraw or the configuration's draw, 0 .. 1; 0: never. It then
                                 waits for lost_rejects refusals more */
+    uint32_t unused;         /* 0 */
     pfl_status_t (*keep)(pfl_t *f, uint32_t what, uint32_t number, const void *z); /* pfl_watch_keep */
 } pfl_watch_t;
 
@@ -204,6 +207,7 @@ typedef struct {
     uint32_t circular_mask; /* bit d set: state d is an angle in rad, averaged on the circle: needs `circular`. Wrapped
                                 in estimates, never in the particles */
     float ess_ratio;        /* resample when the effective sample size < ess_ratio N; 0: never, 1: always; 0.5 usual */
+    uint32_t unused;        /* 0 */
     uint64_t seed;          /* any value; the same seed replays the same run */
     uint32_t
         dt_max_us; /* longest model step; a longer one is cut into up to PFL_SUBSTEPS_MAX; 0: no limit but 2^32 us, 71 minutes */
