@@ -34,7 +34,7 @@ static bool box_is_good(const pfl_config_t *c)
 }
 
 /* NaN is none. */
-static bool is_share(float x)
+PFL_NOINLINE static bool is_share(float x)
 {
     return (x >= 0.0f) && (x <= 1.0f);
 }

@@ -373,6 +373,7 @@ void test_a_snapshot_keeps_every_counter(void)
     for (uint32_t k = 0u; k < (sizeof counters / sizeof counters[0]); k++) {
         *counters[k] = 1000u + k;
     }
+    f->watched.reject = 1u; /* of sensors that are there */
     f->reset_t_us = 0x123456789Au;
     f->watched.since_us = 0x987654321u;
     f->watched.phase = (uint32_t)PFL_PHASE_DEGRADED;
