@@ -45,7 +45,7 @@ static const option_t options[] = {
     [OPTION_FILTER] = {"--filter", "F", "the filter: one of those that `list` shows", FOR_ONE},
     [OPTION_PARTICLES] = {"--particles", "N", "number of particles", FOR_ONE},
     [OPTION_RUNS] = {"--runs", "R", "number of Monte Carlo runs", FOR_ANY},
-    [OPTION_SEED] = {"--seed", "S", "seed of everything random (default 1)", FOR_ANY},
+    [OPTION_SEED] = {"--seed", "S", "seed of everything random (default 2)", FOR_ANY},
     [OPTION_THREADS] = {"--threads", "T", "threads (default: processors); the results do not depend on it", FOR_ANY},
     [OPTION_SET] = {"--set", "key=value", "a setting of the scenario: one of those that `list` shows", FOR_ONE},
     [OPTION_DATA] = {"--data", "DIR", "folder of the recordings (default: $PFLIGHT_DATA, or ../shared/data)", FOR_ANY},
@@ -257,7 +257,7 @@ static void set_defaults(cli_t *cli)
     processors = sysconf(_SC_NPROCESSORS_ONLN);
 #endif
     memset(cli, 0, sizeof *cli);
-    cli->seed = 1u;
+    cli->seed = 2u;
     cli->threads = processors < 1 ? 1u : (unsigned)processors;
     cli->threads = cli->threads > THREADS_MAX ? THREADS_MAX : cli->threads;
     cli->out = "out";
