@@ -237,7 +237,8 @@ static void choose_options(stream_t *in, setup_t *s)
         c->hi = s->hi;
     }
     if ((take_u8(in) & 1u) != 0u) {
-        s->constraint = (pfl_constraint_t){inside, project, NULL, 1u + take_below(in, 4u), pfl_constraint_keep};
+        s->constraint = (pfl_constraint_t){
+            .inside = inside, .project = project, .tries = 1u + take_below(in, 4u), .keep = pfl_constraint_keep};
         c->constraint = &s->constraint;
     }
     if (((take_u8(in) & 1u) != 0u) && (c->moments == PFL_MOMENTS_FULL)) {

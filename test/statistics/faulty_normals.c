@@ -12,7 +12,7 @@ static float spoil(float z, float neighbour, size_t i)
     case 2: /* no tails beyond 4 */
         return (z > 4.0f) ? 4.0f : ((z < -4.0f) ? -4.0f : z);
     case 3: /* one lane leans on the next */
-        return ((i % 16u) == 5u) ? (0.99995f * z) + (0.01f * neighbour) : z;
+        return ((i % 16u) == 5u) ? (0.9998f * z) + (0.02f * neighbour) : z;
     case 4: /* a gap in the middle */
         return ((z > 0.499f) && (z < 0.5f)) ? z + 0.001f : z;
     case 5: /* in one lane the sign never changes */

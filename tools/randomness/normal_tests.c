@@ -14,7 +14,7 @@
 
 #define GROUP 16u         /* normals that one step of the eight streams makes */
 #define GROUPS 256u       /* made at once */
-#define BEFORE 8u         /* groups kept of those before: two columns of a batch of 64 lie four groups apart */
+#define BEFORE 8u         /* groups kept of those before: two columns of a batch of 128 lie eight groups apart */
 #define BINS_PER_UNIT 128 /* of the histogram */
 #define Z_MAX 8
 #define BINS (2 * Z_MAX * BINS_PER_UNIT)
