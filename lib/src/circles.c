@@ -5,10 +5,15 @@
 #include "pflight/math.h"
 
 /* Sine and cosine of angles about a centre into the first two work columns. */
-PFL_NOINLINE static void circle(float *restrict work, const float *restrict x, float centre, uint32_t n)
+PFL_NOINLINE static void circle(float *restrict sines, float *restrict cosines, const float *restrict x, float centre,
+                                uint32_t n)
 {
     for (uint32_t i = 0u; i < n; i++) {
-        pfl_sincos_kernel(pfl_wrap_pi_kernel(x[i] - centre), &work[i], &work[PFL_BATCH + i]);
+        float s;
+        float c;
+        pfl_sincos_kernel(pfl_wrap_pi_kernel(x[i] - centre), &s, &c);
+        sines[i] = s;
+        cosines[i] = c;
     }
 }
 
@@ -19,7 +24,7 @@ PFL_NOINLINE static void circle_lanes(pfl_t *f, uint32_t first, uint32_t n)
     static const float no_centre[2];
     for (uint32_t d = 0u; d < states; d++) {
         if (pfl_is_circular(f, d)) {
-            circle(f->work, &f->x[((size_t)d * f->stride) + first], f->centre[d], n);
+            circle(f->work, &f->work[PFL_BATCH], &f->x[((size_t)d * f->stride) + first], f->centre[d], n);
             pfl_lanes_products(pfl_row_at(f, ROW_CIRCLE(states) + (2u * d)), &f->scratch[first], f->work, PFL_BATCH,
                                no_centre, n);
         }
