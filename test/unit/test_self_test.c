@@ -24,10 +24,10 @@ void test_the_known_answers_are_computed(void)
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_self_test(arena, PFL_SELF_TEST_BYTES)); /* whatever was in it */
 }
 
-#if defined(FE_UPWARD) && defined(FE_DOWNWARD) && defined(FE_TOWARDZERO) /* not in every C library of small cores */
 /* Another rounding mode, as a careless interrupt handler leaves it, gives other bits. */
 void test_a_wrong_rounding_mode_is_seen(void)
 {
+#if defined(FE_UPWARD) && defined(FE_DOWNWARD) && defined(FE_TOWARDZERO)
     static const int modes[] = {FE_UPWARD, FE_DOWNWARD, FE_TOWARDZERO};
     void *arena = ut_arena(PFL_SELF_TEST_BYTES);
     for (uint32_t k = 0u; k < 3u; k++) {
@@ -37,8 +37,8 @@ void test_a_wrong_rounding_mode_is_seen(void)
         TEST_ASSERT_EQUAL_INT(PFL_ERR_SELF_TEST, status);
     }
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_self_test(arena, PFL_SELF_TEST_BYTES));
+#endif /* the C library of a small core has no such call */
 }
-#endif
 
 void test_it_leaves_no_filter_behind(void)
 {
