@@ -47,6 +47,8 @@ def stage_cells(result):
 def cycle():
     results = [(build, quiet(host, "--build", build)) for build in measure.BUILDS]
     results += [(name, quiet(target, "--target", name)) for name in TARGETS]
+    results += [("x86-64-v3, antithetic noise", quiet(host, "--noise", "antithetic")),
+                ("cortex-m4f, antithetic noise", quiet(target, "--noise", "antithetic"))]
     lines = head(["land-vehicle, N = 1000", "all", *STAGES, "never resampling", "always"])
     for name, result in results:
         lines.append(row([f"{name}, {result['compiler']}", f"{result['instructions_per_particle_step']:.1f}", *stage_cells(result),

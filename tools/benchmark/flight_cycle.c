@@ -112,6 +112,9 @@ static const work_t *find_work(const char *name)
     if (strcmp(name, "land-vehicle") == 0) {
         return work_land_vehicle();
     }
+    if (strcmp(name, "land-vehicle-antithetic") == 0) {
+        return work_land_vehicle_antithetic();
+    }
     const unsigned long states = (strncmp(name, "chain-", 6u) == 0) ? strtoul(name + 6, NULL, 10) : 0u;
     return ((states >= 2u) && (states <= PFL_STATES_MAX) && ((states % 2u) == 0u)) ? work_chain((uint16_t)states)
                                                                                    : NULL;

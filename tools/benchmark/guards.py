@@ -31,7 +31,7 @@ def on_host(build, on, particles):
 
 
 def on_target(machine, on, particles):
-    wanted = argparse.Namespace(seed=1, particles=particles, filter=None, set=[], steps=host.STEPS, optimise="O3", sharpen=None,
+    wanted = argparse.Namespace(seed=1, particles=particles, filter=None, set=[], steps=host.STEPS, optimise="O3", sharpen=None, noise="own",
                                 ess_ratio=None, defines=switches(on))
     result = flight.fly("land-vehicle", machine, wanted)
     if result["instructions"] is None or not result["same_bits"]:

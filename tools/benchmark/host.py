@@ -20,6 +20,7 @@ VARIANTS = {"never": 0.0, "always": 1.0}
 def add_options(parser):
     parser.add_argument("--scenario", choices=SCENARIOS, default="land-vehicle")
     parser.add_argument("--particles", type=measure.particles, metavar="N", help="default: 1000; the scenario's own")
+    flight.add_noise(parser)
     measure.add_build(parser)
     measure.add_json(parser)
 
@@ -42,8 +43,9 @@ def fly(program, work, particles, steps, ess_ratio=0.5, repetitions=0):
 def land_vehicle(options):
     program = measure.built("flight_cycle", options.build)
     particles = options.particles or 1000
-    said, stages = fly(program, "land-vehicle", particles, STEPS, repetitions=REPETITIONS)
-    variants = {name: sum(fly(program, "land-vehicle", particles, STEPS, ratio)[1].values()) for name, ratio in VARIANTS.items()}
+    work = {"own": "land-vehicle", "antithetic": "land-vehicle-antithetic"}[options.noise]
+    said, stages = fly(program, work, particles, STEPS, repetitions=REPETITIONS)
+    variants = {name: sum(fly(program, work, particles, STEPS, ratio)[1].values()) for name, ratio in VARIANTS.items()}
     return {"particles": particles, "steps": STEPS, "stages": stages, "variants": variants, "ns": float(said["ns"]),
             "repetitions": REPETITIONS, "arena_bytes": int(said["arena_bytes"]), "hash": said["hash"],
             "resampled": int(said["resampled"])}
@@ -59,7 +61,7 @@ def player(build, port):
 
 def play(options, folder, ess_ratio):
     """Counts one play of the folder's tape; its line, the instructions by stage."""
-    wanted = argparse.Namespace(steps=0, ess_ratio=ess_ratio, sharpen=None)
+    wanted = argparse.Namespace(steps=0, ess_ratio=ess_ratio, sharpen=None, noise=options.noise)
     flight.write_tape(folder / "host.in", folder / "tape.in", wanted)
     said, profile = measure.callgrind([str(player(options.build, "null"))], CALLS, folder)
     return said, profile.by_stage(measure.STAGES)
@@ -86,9 +88,9 @@ def replayed(options):
     folder.mkdir(parents=True)
     wanted = argparse.Namespace(seed=1, particles=options.particles, filter=None, set=[])
     _, recorded = flight.record(options.scenario, wanted, folder)
-    particles, repetitions = flight.words(folder / "host.in")[5], 20
+    particles, repetitions = flight.words(folder / "host.in")[flight.HEAD_WORDS + 1], 20
     said, stages = play(options, folder, None)
-    same = (folder / "tape.out").read_bytes() == (folder / "host.out").read_bytes()
+    same = options.noise != "own" or (folder / "tape.out").read_bytes() == (folder / "host.out").read_bytes()
     if not same:
         raise Failure(f"{options.scenario}: the player's answers are not those of tools/run", 1)
     resampled = max(tick[3] for tick in ticks(folder))
@@ -97,7 +99,7 @@ def replayed(options):
     steps = int(said["cycles"])
     return {"particles": particles, "steps": steps, "stages": stages, "variants": variants,
             "ns": nanoseconds / (particles * steps), "repetitions": repetitions, "arena_bytes": int(said["arena"]),
-            "hash": recorded["hash"], "resampled": resampled}
+            "hash": recorded["hash"] if options.noise == "own" else said["hash"], "resampled": resampled}
 
 
 # ---- Figures --------------------------------------------------------------------------------------------------------------
@@ -107,7 +109,7 @@ def figures(options):
     raw = land_vehicle(options) if options.scenario == "land-vehicle" else replayed(options)
     per = raw["particles"] * raw["steps"]
     return {
-        "schema": 2, "benchmark": "host", "scenario": options.scenario, "build": options.build, "compiler": measure.compiler(),
+        "schema": 2, "benchmark": "host", "scenario": options.scenario, "noise": options.noise, "build": options.build, "compiler": measure.compiler(),
         "particles": raw["particles"], "steps": raw["steps"], "instructions_not_cycles": True,
         "instructions_per_particle_step": round(sum(raw["stages"].values()) / per, 3),
         "stages": {stage: round(count / per, 3) for stage, count in raw["stages"].items()},
@@ -118,9 +120,13 @@ def figures(options):
     }
 
 
+def noise_of(result):
+    return "" if result["noise"] == "own" else f", {result['noise']} noise"
+
+
 def show(result):
     total = result["instructions_per_particle_step"]
-    print(f"{result['scenario']}, {result['particles']} particles, {result['steps']} cycles, -O3 -march={result['build']}, "
+    print(f"{result['scenario']}{noise_of(result)}, {result['particles']} particles, {result['steps']} cycles, -O3 -march={result['build']}, "
           f"{result['compiler']}")
     print("\ninstructions per particle and step (instructions, not cycles):")
     for stage, count in result["stages"].items():

@@ -19,6 +19,7 @@ def add_options(parser):
     parser.add_argument("--scenario", choices=host.SCENARIOS, default="land-vehicle")
     parser.add_argument("--particles", type=measure.particles, metavar="N", help="default: 1000; the scenario's own")
     parser.add_argument("--steps", type=measure.whole(1, 1000000), metavar="K", help="stop after K cycles (default: the whole run)")
+    flight.add_noise(parser)
     measure.add_json(parser)
 
 
@@ -51,7 +52,7 @@ def figures(options):
     totals = {}
     for variant in ("always", "never", "as_flown"):  # the last one's files stay
         wanted = argparse.Namespace(seed=1, particles=particles, filter=None, set=[], steps=options.steps, optimise="O3",
-                                    sharpen=None, ess_ratio=VARIANTS[variant])
+                                    sharpen=None, ess_ratio=VARIANTS[variant], noise=options.noise)
         result = flight.fly(options.scenario, machine, wanted)
         if result["instructions"] is None:
             raise measure.Failure("this QEMU takes no plugin to count with")
@@ -61,7 +62,7 @@ def figures(options):
     folder = flight.BUILD / "flights" / f"{machine.name}-O3" / options.scenario
     cost = result["instructions"]
     return {
-        "schema": 1, "benchmark": "target", "target": options.target, "scenario": options.scenario,
+        "schema": 1, "benchmark": "target", "target": options.target, "scenario": options.scenario, "noise": options.noise,
         "compiler": f"{result['compiler']} -O3", "particles": result["particles"], "steps": result["steps"],
         "instructions_not_cycles": True, "instructions_per_particle_step": round(totals["as_flown"], 2),
         "stages": stages_of(machine, folder, result), "resample_never": round(totals["never"], 2),
@@ -73,7 +74,7 @@ def figures(options):
 
 def show(result):
     total = result["instructions_per_particle_step"]
-    print(f"{result['scenario']} on {result['target']}, {result['particles']} particles, {result['steps']} cycles, "
+    print(f"{result['scenario']}{host.noise_of(result)} on {result['target']}, {result['particles']} particles, {result['steps']} cycles, "
           f"{result['compiler']}")
     print("\ninstructions per particle and step (instructions, not cycles):")
     for stage, count in result["stages"].items():

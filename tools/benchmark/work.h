@@ -21,6 +21,9 @@ typedef struct {
 /* The land vehicle of the reference work: position and speed seen, case 1 read as variances, T = 0.5 s, known start. */
 const work_t *work_land_vehicle(void);
 
+/* The same with antithetic noise. */
+const work_t *work_land_vehicle_antithetic(void);
+
 /* `states` / 2 masses, each moving at a speed that white noise drives, each position seen. 2 to 16 states, even. */
 const work_t *work_chain(uint16_t states);
 

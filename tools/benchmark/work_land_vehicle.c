@@ -66,3 +66,17 @@ const work_t *work_land_vehicle(void)
     }
     return &work;
 }
+
+const work_t *work_land_vehicle_antithetic(void)
+{
+    static pfl_antithetic_t mirrored;
+    static work_t work;
+    work = *work_land_vehicle();
+    mirrored.predict = work.predict;
+    mirrored.user = work.model;
+    mirrored.noises = work.noises;
+    work.predict = pfl_antithetic_predict;
+    work.model = &mirrored;
+    work.noises = (uint16_t)PFL_ANTITHETIC_NOISES(mirrored.noises);
+    return &work;
+}

@@ -139,6 +139,11 @@ def runner(command, folder, **environment):
     return command, json.loads(done.stdout)
 
 
+def add_noise(parser):
+    parser.add_argument("--noise", choices=["own", "antithetic"], default="own",
+                        help="each particle's own, or antithetic (pflight/antithetic.h)")
+
+
 def write_tape(recorded, path, options):
     """The recorded tape with the wanted changes in its head."""
     data = bytearray(recorded.read_bytes())
@@ -147,6 +152,7 @@ def write_tape(recorded, path, options):
         struct.pack_into("<f", data, 8, options.ess_ratio)
     if options.sharpen is not None:
         struct.pack_into("<f", data, 12, options.sharpen)
+    struct.pack_into("<I", data, 16, options.noise == "antithetic")
     path.write_bytes(data)
 
 
@@ -180,6 +186,7 @@ def plug_arguments(machine, image, log):
     return ",".join([str(plugin()), f"out={log}", f"blocks={log}.blocks", f"from={where['io_open']}", *calls, *parts])
 
 
+HEAD_WORDS = 5  # TAPE_HEAD_WORDS; an operation, the particles and the rest of the configuration follow
 COUNTER_SLACK = 32  # instructions between the port's reading of its counter and the call
 
 
@@ -281,11 +288,11 @@ def fly(scenario, machine, options, counted=True):
     write_tape(folder / "host.in", folder / "tape.in", options)
     line = play(machine, image, folder)
     ours, host = (folder / "tape.out").read_bytes(), (folder / "host.out").read_bytes()
-    as_flown = options.ess_ratio is None and options.sharpen is None and (not options.steps or len(ours) == len(host))
+    as_flown = options.ess_ratio is None and options.sharpen is None and options.noise == "own" and (not options.steps or len(ours) == len(host))
     result = {
         "schema": 1, "scenario": scenario, "target": machine.name, "compiler": compiler_of(machine),
         "optimisation": f"-{options.optimise}" if machine.toolchain else machine.what.split(", ")[1],
-        "particles": words(folder / "host.in")[5], "steps": int(line["cycles"]), "instructions_not_cycles": True,
+        "particles": words(folder / "host.in")[HEAD_WORDS + 1], "steps": int(line["cycles"]), "instructions_not_cycles": True,
         "arena_bytes": int(line["arena"]),
     }
     if not as_flown:  # not what the runner flew: the player on this machine flies it too, from the same tape

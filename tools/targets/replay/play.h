@@ -13,6 +13,7 @@ typedef struct {
     uint32_t steps_max;
     float ess_ratio; /* < 0: the tape's */
     float sharpen;
+    bool mirror; /* antithetic noise */
     uint32_t cycles;
     uint32_t calls;
     uint32_t arena_bytes; /* of the last pfl_init */

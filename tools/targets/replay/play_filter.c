@@ -26,6 +26,7 @@ static structure_t sensor_user[PLAY_SENSORS_MAX];
 static const type_t *sensor_z[PLAY_SENSORS_MAX];
 static uint32_t sensor_floats[PLAY_SENSORS_MAX]; /* of z, where it has no type */
 static structure_t model_user;
+static pfl_antithetic_t mirrored;
 static const type_t *model_u;
 static pfl_constraint_t constraint;
 static pfl_ring_t ring;
@@ -66,7 +67,15 @@ static bool read_model(const play_t *p)
     model_u = tape_models[id].u;
     words_next_type(tape_models[id].user, &model_user, p->sharpen);
     config.user = &model_user;
-    return true;
+    if (p->mirror) {
+        mirrored.predict = config.predict;
+        mirrored.user = config.user;
+        mirrored.noises = config.noises;
+        config.predict = pfl_antithetic_predict;
+        config.user = &mirrored;
+        config.noises = (uint16_t)PFL_ANTITHETIC_NOISES(config.noises);
+    }
+    return !p->mirror || (mirrored.noises <= PFL_ANTITHETIC_MAX);
 }
 
 static bool read_sensors(const play_t *p)

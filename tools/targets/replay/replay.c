@@ -63,6 +63,7 @@ static bool read_head(play_t *p)
     p->steps_max = words_next();
     p->ess_ratio = words_next_float();
     p->sharpen = words_next_float();
+    p->mirror = words_next() != 0u;
     p->hash = WORDS_HASH_START;
     return magic == TAPE_MAGIC;
 }

@@ -22,6 +22,7 @@ enum {
     TAPE_HEAD_STEPS,     /* stop before the pfl_predict after this many; 0: play all */
     TAPE_HEAD_ESS_RATIO, /* float: instead of the configuration's; negative: keep it */
     TAPE_HEAD_SHARPEN,   /* float: factor on every sensor's 1/sigma; 1: keep */
+    TAPE_HEAD_MIRROR,    /* 1: antithetic noise around the model, instead of normals of its own for every particle */
     TAPE_HEAD_WORDS
 };
 
