@@ -99,7 +99,7 @@ struct pfl {
     uint32_t redrawn, projected;
     pfl_watched_t watched;
 
-    uintptr_t seal;                /* hash of all above, between calls */
+    uint32_t seal;                 /* hash of all above, between calls */
     uint32_t open;                 /* during a call */
     uint32_t copy[PFL_COPY_WORDS]; /* of all above, between calls */
     pfl_rng_t rng;                 /* unguarded: any state but zero is as good as any other */

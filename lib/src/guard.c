@@ -5,15 +5,14 @@
  * agree are right, so that one flipped bit anywhere is mended without a trace in the results. */
 #include "guard.h"
 
+#include "hash_kernel.h"
 #include "lanes.h"
-#include "rng_kernels.h"
 
 #define OPEN 0x6F70656Eu     /* "open": a call is in progress, and the block may differ from its copy */
 #define SENTINEL 0x3F8CAFE5u /* a float near 1.1: harmless where sums run over the padding */
 
 #define CONFIG_WORDS ((offsetof(pfl_config_t, user) + sizeof(void *)) / 4u) /* 32-bit machines pad behind it */
 #define SEALED_WORDS (offsetof(struct pfl, seal) / 4u)
-#define SEALED_LONG_WORDS (offsetof(struct pfl, seal) / sizeof(uintptr_t))
 #define CONSTANT_WORDS (offsetof(struct pfl, reset_t_us) / 4u)
 #define LOOP_WORDS (offsetof(struct pfl, mean) / sizeof(uintptr_t))
 
@@ -30,27 +29,14 @@ static uint32_t word_at(const void *bytes, size_t k)
     return word;
 }
 
-/* One to one in each word, so that no change of a single word stays unseen. */
 PFL_NOINLINE static uint32_t hash_words(uint32_t hash, const void *bytes, size_t words)
 {
-    for (size_t k = 0u; k < words; k++) {
-        hash = pfl_rotl((hash ^ word_at(bytes, k)) * 0x9E3779B1u, 13u);
-    }
-    return hash;
+    return pfl_hash_kernel(hash, bytes, words);
 }
 
-/* The same of the control block, by words as long as the machine's. */
-PFL_NOINLINE static uintptr_t hash_block(const void *block)
+PFL_NOINLINE static uint32_t hash_block(const void *block)
 {
-    const unsigned char *at = (const unsigned char *)block;
-    uintptr_t hash = 1u;
-    for (size_t k = 0u; k < SEALED_LONG_WORDS; k++) {
-        uintptr_t word;
-        PFL_COPY(&word, &at[k * sizeof word], sizeof word);
-        hash = (hash ^ word) * (uintptr_t)0x9E3779B97F4A7C15u;
-        hash = (hash << 13) | (hash >> ((8u * sizeof hash) - 13u));
-    }
-    return hash;
+    return hash_words(1u, block, SEALED_WORDS);
 }
 
 PFL_NOINLINE static void count_mended(pfl_t *f, uint32_t fault)
@@ -184,9 +170,16 @@ pfl_view_t pfl_guard_view(pfl_t *f, uint32_t first, uint32_t n)
 {
     pfl_view_t view = {&f->x[first], f->stride, first, n};
     if (PFL_GUARD_VIEW != 0) {
-        const uint32_t states = f->config->states;
-        for (uint32_t d = 0u; d < states; d++) {
-            pfl_lanes_copy(&f->work[(size_t)d * PFL_BATCH], &view.x[d * view.stride], (uint32_t)PFL_CEIL8(n));
+        const float *from = view.x;
+        float *to = f->work;
+        for (uint32_t left = f->config->states; left > 0u; left--) {
+            if (n == PFL_BATCH) { /* a constant, so that compilers unroll it */
+                pfl_lanes_copy(to, from, PFL_BATCH);
+            } else {
+                pfl_lanes_copy(to, from, (uint32_t)PFL_CEIL8(n));
+            }
+            from += f->stride;
+            to += PFL_BATCH;
         }
         view.x = f->work;
         view.stride = PFL_BATCH;
@@ -214,34 +207,26 @@ bool pfl_guard_bay_is_whole(const float *bay, uint32_t n)
 
 /* ---- Canaries ------------------------------------------------------------------------------------------------- */
 
-/* Canary k of the arena: before the first state, behind each state's last particle, behind each weight column. */
-static float *canary_at(const pfl_t *f, uint32_t k)
+static uint32_t renew(float *canary)
 {
-    const size_t states = f->config->states;
-    float *behind = f->x + (states * f->stride);
-    if (k == 0u) {
-        return f->x - 1;
-    }
-    if (k <= states) {
-        return f->x + (((size_t)(k - 1u) * f->stride) + f->config->particles);
-    }
-    return behind + (((size_t)(k - states) * (f->stride + PFL_CANARY_FLOATS)) - PFL_CANARY_FLOATS);
+    const uint32_t different = pfl_load_u32(canary) ^ SENTINEL;
+    pfl_store_u32(canary, SENTINEL);
+    return different;
 }
 
-static uint32_t canaries_of(const pfl_t *f)
-{
-    return f->config->states + 3u;
-}
-
-/* Sets them; true when all of them were alive. */
+/* Before the first state, behind each state's last particle, behind each weight column. True when all were alive. */
 PFL_NOINLINE static bool set_canaries(const pfl_t *f)
 {
-    uint32_t different = 0u;
-    for (uint32_t k = 0u; k < canaries_of(f); k++) {
-        float *canary = canary_at(f, k);
-        different |= pfl_load_u32(canary) ^ SENTINEL;
-        pfl_store_u32(canary, SENTINEL);
+    const size_t stride = f->stride;
+    float *at = f->x + f->config->particles;
+    uint32_t different = renew(f->x - 1);
+    for (uint32_t left = f->config->states; left > 0u; left--) {
+        different |= renew(at);
+        at += stride;
     }
+    at = f->x + ((f->config->states + 1u) * stride);
+    different |= renew(at);
+    different |= renew(at + (stride + PFL_CANARY_FLOATS));
     return different == 0u;
 }
 

@@ -156,19 +156,17 @@ static inline void pfl_lanes_weigh(float *restrict rows, float *restrict w, cons
     }
 }
 
-/* to = from, without a call. */
+/* to = from, without a call; n is a multiple of eight. */
 static inline void pfl_lanes_copy(float *restrict to, const float *restrict from, uint32_t n)
 {
-    for (uint32_t groups = n / PFL_LANES; groups > 0u; groups--) {
+    for (uint32_t i = 0u; i < n; i += PFL_LANES) {
 #if PFL_VECTOR_LANES > 1
-        for (uint32_t k = 0u; k < PFL_LANE_PARTS; k++) {
-            ((pfl_part_t *)to)[k] = ((const pfl_part_t *)from)[k];
+        for (uint32_t k = 0u; k < PFL_LANES; k += PFL_VECTOR_LANES) {
+            *(pfl_part_t *)&to[i + k] = *(const pfl_part_t *)&from[i + k];
         }
 #else
-        PFL_COPY(to, from, PFL_LANES * sizeof(float));
+        PFL_COPY(&to[i], &from[i], PFL_LANES * sizeof(float));
 #endif
-        to += PFL_LANES;
-        from += PFL_LANES;
     }
 }
 

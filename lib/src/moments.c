@@ -150,10 +150,24 @@ static void finish_weights(pfl_t *f)
     f->scratch_is_weights = 1u;
 }
 
+/* Is one of the next 4 PFL_LANES log-weights the wanted one? A vector core asks for many at a time. */
+static inline bool next_have(const float *x, int32_t bits)
+{
+    uint32_t found = 0u;
+    for (uint32_t k = 0u; k < (4u * PFL_LANES); k++) {
+        found |= (pfl_bits(x[k]) == bits) ? 1u : 0u;
+    }
+    return found != 0u;
+}
+
 void pfl_set_best(pfl_t *f, uint32_t first)
 {
     const int32_t top = pfl_bits(f->log_weight_top);
     uint32_t best = first;
+    while ((PFL_VECTOR_LANES > 1) && ((best + (4u * PFL_LANES)) < f->config->particles) &&
+           !next_have(&f->log_weight[best], top)) {
+        best += 4u * PFL_LANES;
+    }
     while ((pfl_bits(f->log_weight[best]) != top) && ((best + 1u) < f->config->particles)) {
         best++;
     }

@@ -89,14 +89,25 @@ pfl_batch_t pfl_batch_at(pfl_t *f, uint32_t first, uint32_t n)
 
 typedef char pfl_spare_column_fits[(sizeof(pfl_rng_t) <= (sizeof(float) * PFL_BATCH)) ? 1 : -1];
 
+/* Saves the first group of all states, or puts it back; where there are fewer particles, what lies behind them with it,
+ * which a model does not change. */
+PFL_NOINLINE static void copy_first_group(const pfl_t *f, bool back)
+{
+    float *kept = f->lanes;
+    float *x = f->x;
+    for (uint32_t left = f->config->states; left > 0u; left--) {
+        PFL_COPY(back ? x : kept, back ? kept : x, sizeof(float) * PFL_GROUP);
+        kept += PFL_GROUP;
+        x += f->stride;
+    }
+}
+
 /* The first group of a step, which can be undone: saved, moved, and put back when nothing finite came out. */
 static bool first_group_survives(pfl_t *f, const void *u, float dt_s, uint32_t n, bool rehearsal)
 {
     const uint32_t states = f->config->states;
     float *spare = &f->work[PFL_WORK_FLOATS(states, f->config->noises) - PFL_BATCH]; /* the column no noise uses */
-    for (uint32_t d = 0u; d < states; d++) {
-        memcpy(&f->lanes[(size_t)d * PFL_GROUP], &f->x[(size_t)d * f->stride], sizeof(float) * n);
-    }
+    copy_first_group(f, false);
     memcpy(spare, &f->rng, sizeof f->rng);
     const pfl_batch_t batch = pfl_batch_at(f, 0u, n);
     pfl_make_noise(f, f->config->noises, n);
@@ -106,9 +117,7 @@ static bool first_group_survives(pfl_t *f, const void *u, float dt_s, uint32_t n
     if (survives && !rehearsal) {
         return true;
     }
-    for (uint32_t d = 0u; d < states; d++) {
-        memcpy(&f->x[(size_t)d * f->stride], &f->lanes[(size_t)d * PFL_GROUP], sizeof(float) * n);
-    }
+    copy_first_group(f, true);
     memcpy(&f->rng, spare, sizeof f->rng);
     return survives;
 }
