@@ -180,7 +180,7 @@ PFL_NOINLINE static pfl_status_t catch_up(pfl_t *f, const void *u, float dt_s)
     ensures dt_us <= \result * longest; */
 static uint32_t pieces_of(uint32_t dt_us, uint32_t longest)
 {
-    return ((dt_us - 1u) / longest) + 1u;
+    return (dt_us / longest) + (((dt_us % longest) != 0u) ? 1u : 0u);
 }
 
 /* The next of k pieces that make up what is left of a step: not too long, leaves k - 1 that are not, and the last takes

@@ -24,10 +24,10 @@
 PFL_NOINLINE comb_t pfl_comb_of(uint32_t count, uint32_t total)
 {
     uint32_t shift = 29u;
-    /*@ loop invariant 9 <= shift <= 29;
-        loop assigns shift;
+    /*@ loop invariant 9 <= shift <= 29 && half < (1 << (shift - 9));
+        loop assigns shift, half;
         loop variant shift; */
-    while ((shift > 9u) && ((count >> (30u - shift)) != 0u)) {
+    for (uint32_t half = count / 2u; half != 0u; half /= 2u) {
         shift--;
     }
     uint32_t rest = count << shift; /* less than 2^30 */
@@ -252,69 +252,28 @@ PFL_NOINLINE static moves_t list_moves(const float *restrict offspring, float *r
     return moves;
 }
 
-/* Writes one state of all parents to the slots of their copies. Offspring sum to N, so that the last copy fills the last
- * slot; should memory be damaged, no copy goes beyond it: a count too large ends the copying. */
-/*@ requires sized(f) && column(f->scratch, f) && column(f->log_weight, f) && column(x, f);
-    requires listed(f->log_weight, padded(f), moves.slots, moves.parents);
-    requires \separated(x + (0 .. f->stride - 1), f->log_weight + (0 .. f->stride - 1));
-    assigns x[0 .. f->stride - 1];
+/* Writes four states of all parents to the slots of their copies: the column at `a` and those `near`, `far` and both
+ * further on. Offspring sum to N, so that the last copy fills the last slot; should memory be damaged, no copy goes
+ * beyond it: a count too large ends the copying. */
+/*@ requires sized(f) && column(f->scratch, f) && column(f->log_weight, f) && near <= f->stride && far <= 2 * f->stride;
+    requires \valid(a + (0 .. near + far + f->stride - 1)) && listed(f->log_weight, padded(f), moves.slots, moves.parents);
+    requires \separated(a + (0 .. near + far + f->stride - 1), f->log_weight + (0 .. f->stride - 1));
+    assigns a[0 .. near + far + f->stride - 1];
     ensures listed(f->log_weight, padded(f), moves.slots, moves.parents); */
-static void copy_state(const pfl_t *f, float *x, moves_t moves)
+static void copy_four_states(const pfl_t *f, float *a, size_t near, size_t far, moves_t moves)
 {
     const float *const offspring = f->scratch;
     const float *const list = f->log_weight;
     const float *slot = list;
     const float *parent = &list[pfl_padded(f)];
     uint32_t room = moves.slots;
+    float *const b = a + near;
+    float *const c = a + far;
+    float *const d = c + near;
     /*@ loop invariant k <= moves.parents && room <= moves.slots;
         loop invariant parent == list + (padded(f) - k) && slot == list + (moves.slots - room);
         loop invariant listed(f->log_weight, padded(f), moves.slots, moves.parents);
-        loop assigns k, slot, parent, room, x[0 .. f->stride - 1];
-        loop variant moves.parents - k; */
-    for (uint32_t k = 0u; k < moves.parents; k++) {
-        parent--;
-        const uint32_t from = pfl_load_u32(parent);
-        /*@ assert from < padded(f); */
-        const uint32_t u = pfl_load_u32(&x[from]);
-        const uint32_t more = pfl_load_u32(&offspring[from]) - 2u; /* copies after the first */
-        if (more >= room) {
-            break;
-        }
-        //@ ghost uint32_t i = moves.slots - room;
-        room -= more + 1u;
-        const float *const stop = slot + (more + 1u);
-        /*@ loop invariant i < moves.slots - room && slot == list + i;
-            loop invariant listed(f->log_weight, padded(f), moves.slots, moves.parents);
-            loop assigns i, slot, x[0 .. f->stride - 1];
-            loop variant (moves.slots - room) - i; */
-        do {
-            pfl_store_u32(&x[pfl_load_u32(slot)], u);
-            slot++;
-            //@ ghost i++;
-        } while (slot != stop);
-    }
-}
-
-/* The same for four states at a time, which finds each slot but once. */
-/*@ requires sized(f) && column(f->scratch, f) && column(f->log_weight, f) && \valid(a + (0 .. (4 * f->stride) - 1));
-    requires listed(f->log_weight, padded(f), moves.slots, moves.parents);
-    requires \separated(a + (0 .. (4 * f->stride) - 1), f->log_weight + (0 .. f->stride - 1));
-    assigns a[0 .. (4 * f->stride) - 1];
-    ensures listed(f->log_weight, padded(f), moves.slots, moves.parents); */
-static void copy_four_states(const pfl_t *f, float *a, moves_t moves)
-{
-    const float *const offspring = f->scratch;
-    const float *const list = f->log_weight;
-    const float *slot = list;
-    const float *parent = &list[pfl_padded(f)];
-    uint32_t room = moves.slots;
-    float *const b = a + f->stride;
-    float *const c = b + f->stride;
-    float *const d = c + f->stride;
-    /*@ loop invariant k <= moves.parents && room <= moves.slots;
-        loop invariant parent == list + (padded(f) - k) && slot == list + (moves.slots - room);
-        loop invariant listed(f->log_weight, padded(f), moves.slots, moves.parents);
-        loop assigns k, slot, parent, room, a[0 .. (4 * f->stride) - 1];
+        loop assigns k, slot, parent, room, a[0 .. near + far + f->stride - 1];
         loop variant moves.parents - k; */
     for (uint32_t k = 0u; k < moves.parents; k++) {
         parent--;
@@ -333,7 +292,7 @@ static void copy_four_states(const pfl_t *f, float *a, moves_t moves)
         const float *const stop = slot + (more + 1u);
         /*@ loop invariant i < moves.slots - room && slot == list + i;
             loop invariant listed(f->log_weight, padded(f), moves.slots, moves.parents);
-            loop assigns i, slot, a[0 .. (4 * f->stride) - 1];
+            loop assigns i, slot, a[0 .. near + far + f->stride - 1];
             loop variant (moves.slots - room) - i; */
         do {
             const uint32_t to = pfl_load_u32(slot);
@@ -348,6 +307,7 @@ static void copy_four_states(const pfl_t *f, float *a, moves_t moves)
     }
 }
 
+/* Four columns at a time; where fewer are left some are written again, with the same. */
 /*@ requires sized(f) && column(f->scratch, f) && column(f->log_weight, f);
     requires 1 <= f->config->states <= PFL_STATES_MAX && \valid(f->x + (0 .. (f->config->states * f->stride) - 1));
     requires \separated(f->x + (0 .. (f->config->states * f->stride) - 1), f->log_weight + (0 .. f->stride - 1));
@@ -362,20 +322,16 @@ PFL_NOINLINE static void copy_surplus(pfl_t *f)
         pfl_store_u32(&f->scratch[i], 1u); /* padding stays as it is */
     }
     const moves_t moves = list_moves(f->scratch, f->log_weight, count);
-    uint32_t d = 0u;
-    /*@ loop invariant d <= f->config->states && listed(f->log_weight, padded(f), moves.slots, moves.parents);
+    const uint32_t states = f->config->states;
+    const uint32_t near = (states > 1u) ? 1u : 0u;
+    const uint32_t far = (states > 3u) ? 2u : (states - 1u - near);
+    /*@ loop invariant d <= states + 3 && (d == 0 || 4 <= d) && listed(f->log_weight, padded(f), moves.slots, moves.parents);
         loop assigns d, f->x[0 .. (f->config->states * f->stride) - 1];
-        loop variant f->config->states - d; */
-    for (; (d + 4u) <= f->config->states; d += 4u) {
-        /*@ assert fits(d, 4, f->config->states, f->stride); */
-        copy_four_states(f, &f->x[(size_t)d * f->stride], moves);
-    }
-    /*@ loop invariant d <= f->config->states && listed(f->log_weight, padded(f), moves.slots, moves.parents);
-        loop assigns d, f->x[0 .. (f->config->states * f->stride) - 1];
-        loop variant f->config->states - d; */
-    for (; d < f->config->states; d++) {
-        /*@ assert fits(d, 1, f->config->states, f->stride); */
-        copy_state(f, &f->x[(size_t)d * f->stride], moves);
+        loop variant states + 3 - d; */
+    for (uint32_t d = 0u; d < states; d += 4u) {
+        const uint32_t from = ((d > 0u) && ((states - d) < 4u)) ? (states - 4u) : d;
+        /*@ assert fits(from, near + far + 1, f->config->states, f->stride); */
+        copy_four_states(f, &f->x[(size_t)from * f->stride], (size_t)near * f->stride, (size_t)far * f->stride, moves);
     }
 }
 

@@ -128,12 +128,12 @@ void pfl_residual(pfl_t *f)
 {
     const uint32_t count = f->config->particles;
     const comb_t comb = pfl_comb_of(count, pfl_quantise(f)); /* shares q M sum to less than N + 1: as do the copies */
-    uint32_t bits = 32u;
-    /*@ loop invariant 11 <= bits <= 32;
-        loop assigns bits;
+    uint32_t bits = 32u; /* 2^bits N <= 2^32: remainders of that many bits cannot overflow their sum */
+    /*@ loop invariant 11 <= bits <= 32 && half < (1 << (bits - 11));
+        loop assigns bits, half;
         loop variant bits; */
-    while ((bits > 11u) && ((count >> (32u - bits)) != 0u)) {
-        bits--; /* 2^bits N <= 2^32: remainders of that many bits cannot overflow their sum */
+    for (uint32_t half = count; half != 0u; half /= 2u) {
+        bits--;
     }
     uint32_t left = count;
     uint32_t rest = 0u;
