@@ -171,6 +171,7 @@ void pfl_count(uint32_t *counter, uint32_t more)
 }
 
 /* The mask's bit for a status of the fault class. */
+/*@ assigns \nothing; */
 static uint32_t fault_bit(pfl_status_t status)
 {
     switch (status) {

@@ -43,6 +43,13 @@
 #endif
 #endif
 
+/* For the proofs: the bits of a float as a number, as far as words that are kept in float columns need it. Words from
+ * 0x7F800000 on may be NaN, which have many bits: nothing is said of them. These contracts are trusted. */
+/*@ axiomatic Bits {
+      logic integer bits_of(float x);
+    } */
+
+/*@ assigns \nothing; */
 static inline int32_t pfl_bits(float x)
 {
     int32_t i;
@@ -50,6 +57,7 @@ static inline int32_t pfl_bits(float x)
     return i;
 }
 
+/*@ assigns \nothing; */
 static inline float pfl_from_bits(int32_t i)
 {
     float x;
@@ -68,6 +76,9 @@ typedef uint32_t pfl_word_t __attribute__((__may_alias__));
 #define PFL_STORE_WORD(p, u) ((void)memcpy((p), &(u), sizeof(uint32_t)))
 #endif
 
+/*@ requires \valid_read(p);
+    assigns \nothing;
+    ensures 0 <= bits_of(*p) < 0x7F800000 ==> \result == bits_of(*p); */
 static inline uint32_t pfl_load_u32(const float *p)
 {
     uint32_t u;
@@ -75,16 +86,21 @@ static inline uint32_t pfl_load_u32(const float *p)
     return u;
 }
 
+/*@ requires \valid(p);
+    assigns *p;
+    ensures u < 0x7F800000 ==> bits_of(*p) == u; */
 static inline void pfl_store_u32(float *p, uint32_t u)
 {
     PFL_STORE_WORD(p, u);
 }
 
+/*@ assigns \nothing; */
 static inline bool pfl_is_finite(float x)
 {
     return ((uint32_t)pfl_bits(x) & 0x7F800000u) != 0x7F800000u;
 }
 
+/*@ assigns \nothing; */
 static inline bool pfl_is_not_nan(float x)
 {
     return ((uint32_t)pfl_bits(x) & 0x7FFFFFFFu) <= 0x7F800000u;

@@ -15,19 +15,32 @@ static void *user_of(const pfl_t *f)
     return (f->config->constraint->user != NULL) ? f->config->constraint->user : f->config->user;
 }
 
-/* Places (0 .. n-1) of particles outside, in order; returns how many. */
-static uint32_t list_outside(pfl_t *f, uint32_t first, uint32_t n)
+/* Flags to places of those without one, in order; returns how many. Never written further than read. */
+/*@ requires n <= PFL_BATCH && \valid(list + (0 .. n - 1));
+    assigns list[0 .. n - 1];
+    ensures \result <= n;
+    ensures \forall integer k; 0 <= k < \result ==> list[k] < n; */
+static uint32_t places(uint32_t *list, uint32_t n)
 {
-    const pfl_view_t view = {&f->x[first], f->stride, first, n};
-    uint32_t *list = flags_of(f);
-    f->config->constraint->inside(user_of(f), &view, list);
     uint32_t outside = 0u;
+    /*@ loop invariant outside <= i <= n && \forall integer k; 0 <= k < outside ==> list[k] < n;
+        loop assigns i, outside, list[0 .. n - 1];
+        loop variant n - i; */
     for (uint32_t i = 0u; i < n; i++) {
         const uint32_t is_outside = (list[i] == 0u) ? 1u : 0u;
         list[outside] = i;
         outside += is_outside;
     }
     return outside;
+}
+
+/* Places (0 .. n-1) of particles outside; returns how many. */
+static uint32_t list_outside(pfl_t *f, uint32_t first, uint32_t n)
+{
+    const pfl_view_t view = {&f->x[first], f->stride, first, n};
+    uint32_t *list = flags_of(f);
+    f->config->constraint->inside(user_of(f), &view, list);
+    return places(list, n);
 }
 
 /* One more attempt for the listed particles: written to their places whatever it gives, so that the last proposal is

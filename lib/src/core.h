@@ -105,7 +105,23 @@ struct pfl {
     pfl_rng_t rng;                 /* unguarded: any state but zero is as good as any other */
 };
 
-/* Length of a column in whole groups of eight; the rest of its stride is a canary. */
+/* For the proofs: what pfl_lay_out builds and every later step relies on. */
+/*@ logic integer padded{L}(pfl_t *f) = ((f->config->particles + 7) / 8) * 8;
+    predicate sized{L}(pfl_t *f) =
+      \valid_read(f) && \valid_read(f->config) && \separated(f, f->config) && 1 <= f->config->particles <= PFL_PARTICLES_MAX &&
+      padded(f) <= f->stride <= f->config->particles + 8;
+    predicate column{L}(float *p, pfl_t *f) = \valid(p + (0 .. f->stride - 1)); */
+/* Rows d .. d + more - 1 lie within `all` rows. */
+/*@ predicate fits(integer d, integer more, integer all, integer stride) =
+      0 <= d * stride && d * stride + more * stride <= all * stride;
+    lemma rows: \forall integer d, more, all, stride;
+      0 <= d && 0 <= more && d + more <= all && 0 <= stride ==> fits(d, more, all, stride); */
+
+/* Length of a column in whole groups of eight; the rest of its stride is a canary. Proofs take this contract on trust, as
+ * they know little of the mask: test/proof/layout.c tries every N. */
+/*@ requires sized(f);
+    assigns \nothing;
+    ensures \result == padded(f) && \result % 8 == 0 && f->config->particles <= \result; */
 static inline uint32_t pfl_padded(const pfl_t *f)
 {
     return (uint32_t)PFL_CEIL8(f->config->particles);
@@ -118,9 +134,17 @@ pfl_status_t pfl_look(const pfl_t *f);  /* PFL_OK, or why nothing in f may be fo
 pfl_status_t pfl_enter(const pfl_t *f); /* the same for a call that only reads f, but not from within a callback */
 pfl_status_t pfl_begin(pfl_t *f);       /* the same for a call that changes f: it ends with pfl_end */
 pfl_status_t pfl_end(pfl_t *f, pfl_status_t status);
-pfl_status_t pfl_fault(pfl_t *f, pfl_status_t status); /* counts a fault, tells the port, returns the status */
+/* Counts a fault, tells the port, returns the status. */
+/*@ requires \valid(f);
+    assigns f->faulted, f->watched.fault;
+    ensures \result == status && f->faulted >= \old(f->faulted); */
+pfl_status_t pfl_fault(pfl_t *f, pfl_status_t status);
 
-void pfl_count(uint32_t *counter, uint32_t more); /* adds, and stays at the end of its range */
+/* Adds, and stays at the end of its range. */
+/*@ requires \valid(counter);
+    assigns *counter;
+    ensures *counter == \min(\old(*counter) + more, 0xFFFFFFFF); */
+void pfl_count(uint32_t *counter, uint32_t more);
 
 /* predict.c */
 uint32_t pfl_quarantine(pfl_t *f, uint32_t first, uint32_t n);
@@ -187,8 +211,17 @@ void pfl_meter_begin(pfl_t *f);    /* of a filter cycle */
 void pfl_meter_resume(pfl_t *f);   /* at the start of a call */
 void pfl_meter_pause(pfl_t *f);    /* at its end: brings the health up to date */
 uint32_t pfl_meter_read(pfl_t *f); /* cycles used so far */
-bool pfl_meter_is_over(pfl_t *f);  /* with a budget: has it run out? counts an overrun once a cycle */
+/* With a budget: has it run out? Counts an overrun once a cycle, and only then. */
+/*@ requires \valid(f) && \valid_read(f->config) && \separated(f, f->config);
+    assigns f->meter.used, f->meter.since, f->overruns, f->overrun_counted, f->watched.event;
+    ensures \result ==> f->meter.used > f->config->budget_cycles && f->overrun_counted != 0;
+    ensures \old(f->overruns) <= f->overruns <= \old(f->overruns) + 1;
+    ensures \old(f->overrun_counted) != 0 || !\result ==> f->overruns == \old(f->overruns); */
+bool pfl_meter_is_over(pfl_t *f);
 
+/*@ requires \valid(f) && \valid_read(f->config) && \separated(f, f->config);
+    assigns f->meter.used, f->meter.since, f->overruns, f->overrun_counted, f->watched.event;
+    ensures \old(f->overruns) <= f->overruns <= \old(f->overruns) + 1; */
 static inline bool pfl_meter_spent(pfl_t *f)
 {
     return (f->config->budget_cycles != 0u) && pfl_meter_is_over(f);

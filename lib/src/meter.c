@@ -5,6 +5,9 @@
 
 #include "pflight/port.h"
 
+/*@ requires \valid(f);
+    assigns f->meter.used, f->cycles_resample, f->overrun_counted;
+    ensures f->meter.used == 0; */
 void pfl_meter_begin(pfl_t *f)
 {
     f->meter.used = 0u;
@@ -12,6 +15,8 @@ void pfl_meter_begin(pfl_t *f)
     f->overrun_counted = 0u;
 }
 
+/*@ requires \valid(f);
+    assigns f->meter.since; */
 void pfl_meter_resume(pfl_t *f)
 {
     if (f->meter.mask != 0u) {
@@ -19,6 +24,12 @@ void pfl_meter_resume(pfl_t *f)
     }
 }
 
+/* Whatever the counter says, the count never falls, and grows by half the counter's range at most. */
+/*@ requires \valid(f);
+    assigns f->meter.used, f->meter.since;
+    ensures \result == f->meter.used;
+    ensures \old(f->meter.used) <= f->meter.used <= \old(f->meter.used) + f->meter.mask / 2;
+    ensures f->meter.mask == 0 ==> f->meter.used == \old(f->meter.used); */
 uint32_t pfl_meter_read(pfl_t *f)
 {
     if (f->meter.mask != 0u) {
@@ -31,6 +42,10 @@ uint32_t pfl_meter_read(pfl_t *f)
     return f->meter.used;
 }
 
+/*@ requires \valid(f) && \valid_read(f->config) && \separated(f, f->config);
+    assigns f->meter.used, f->meter.since, f->cycles_max, f->overruns, f->overrun_counted, f->watched.event;
+    ensures f->cycles_max >= \old(f->cycles_max) && f->cycles_max >= f->meter.used;
+    ensures \old(f->overruns) <= f->overruns <= \old(f->overruns) + 1; */
 void pfl_meter_pause(pfl_t *f)
 {
     (void)pfl_meter_read(f);

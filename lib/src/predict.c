@@ -181,18 +181,42 @@ PFL_NOINLINE static pfl_status_t catch_up(pfl_t *f, const void *u, float dt_s)
     return PFL_OK;
 }
 
+/* As few pieces as can be, none longer than `longest`. */
+/*@ requires 0 < dt_us && 0 < longest;
+    assigns \nothing;
+    ensures 1 <= \result;
+    ensures (\result - 1) * longest < dt_us;
+    ensures dt_us <= \result * longest; */
+static uint32_t pieces_of(uint32_t dt_us, uint32_t longest)
+{
+    return (dt_us / longest) + (((dt_us % longest) != 0u) ? 1u : 0u);
+}
+
+/* The next of k pieces that make up what is left of a step: not too long, leaves k - 1 that are not, and the last takes
+ * all that is left, so that the pieces sum to the step. */
+/*@ requires 1 <= k;
+    assigns \nothing;
+    ensures \result <= left_us;
+    ensures k == 1 ==> \result == left_us;
+    ensures \forall integer longest; 0 < longest && left_us <= k * longest ==>
+              \result <= longest && left_us - \result <= (k - 1) * longest; */
+static uint32_t piece_of(uint32_t left_us, uint32_t k)
+{
+    return left_us / k;
+}
+
 /* At most PFL_SUBSTEPS_MAX pieces: pfl_predict has refused a longer step. */
 pfl_status_t pfl_propagate(pfl_t *f, uint32_t dt_us, const void *u)
 {
     const uint32_t longest = (f->config->dt_max_us != 0u) ? f->config->dt_max_us : UINT32_MAX;
-    const uint32_t pieces = (dt_us / longest) + (((dt_us % longest) != 0u) ? 1u : 0u);
+    const uint32_t pieces = pieces_of(dt_us, longest);
     const bool pending = f->resample_pending != 0u;
     uint32_t lost = 0u;
     uint32_t left_us = dt_us;
     f->busy = 1u;
     pfl_status_t moved = pending ? catch_up(f, u, (float)(dt_us / pieces) * 1.0e-6f) : PFL_OK;
     for (uint32_t k = pieces; (k > 0u) && (moved == PFL_OK); k--) {
-        const uint32_t piece_us = left_us / k;
+        const uint32_t piece_us = piece_of(left_us, k);
         moved = step(f, u, (float)piece_us * 1.0e-6f, (k == pieces) && !pending, &lost);
         left_us -= piece_us;
     }

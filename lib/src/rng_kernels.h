@@ -6,11 +6,15 @@
 
 #include <stdbool.h>
 
+/*@ requires 0 < k < 32;
+    assigns \nothing; */
 static inline uint32_t pfl_rotl(uint32_t x, uint32_t k)
 {
     return (x << k) | (x >> (32u - k));
 }
 
+/*@ requires \valid(s + (0 .. 3));
+    assigns s[0 .. 3]; */
 static inline void pfl_xoshiro_step(uint32_t s[4])
 {
     const uint32_t t = s[1] << 9;
@@ -23,6 +27,8 @@ static inline void pfl_xoshiro_step(uint32_t s[4])
 }
 
 /* xoshiro128++: every bit is good. */
+/*@ requires \valid(s + (0 .. 3));
+    assigns s[0 .. 3]; */
 static inline uint32_t pfl_xoshiro_next(uint32_t s[4])
 {
     const uint32_t result = pfl_rotl(s[0] + s[3], 7u) + s[0];

@@ -31,6 +31,7 @@ extern "C" {
  *
  * returns  the count, within 0 .. pfl_port_cycles_mask(); 0 always where there is no usable counter.
  */
+/*@ assigns \nothing; */
 uint32_t pfl_port_cycles(void);
 
 /*
@@ -57,6 +58,7 @@ uint32_t pfl_port_cycles_hz(void);
  * It must return; the caller gets the status either way, with the filter already in a consistent state.
  * A good hook sets a flag or records a trace event. It must not call pflight.
  */
+/*@ assigns \nothing; */
 void pfl_port_fault(int32_t status);
 
 /*
