@@ -709,7 +709,7 @@ static pfl_status_t do_flip_config(slot_t *s)
     const struct {
         const void *at;
         size_t bytes;
-    } parts[] = {{c, sizeof *c},
+    } parts[] = {{c, offsetof(pfl_config_t, user) + sizeof c->user}, /* 32-bit machines pad behind it */
                  {setup->sensor, c->sensor_count * sizeof setup->sensor[0]},
                  {c->constraint, sizeof *c->constraint},
                  {c->kernel, sizeof *c->kernel},
