@@ -34,6 +34,7 @@ set(PFLIGHT_LIB_SOURCES
   clock.c
   status.c
   guard.c
+  config_copy.c
   watch.c
   health.c
   scrub.c

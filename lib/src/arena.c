@@ -96,6 +96,7 @@ size_t pfl_arena_bytes(const pfl_config_t *config)
     }
     const bool retries = (config->constraint != NULL) && (config->constraint->tries > 1u);
     return PFL_ARENA_BYTES(config->particles, config->states, config->noises) +
+           ((PFL_GUARD_CONFIG == 2) ? pfl_config_copy_bytes(config) : 0u) +
            (retries ? PFL_RETRY_BYTES(config->states) : 0u) +
            ((config->watch != NULL) ? PFL_WATCH_BYTES(config->sensor_count) : 0u);
 }
@@ -111,6 +112,9 @@ pfl_status_t pfl_lay_out(void *arena, size_t arena_bytes, const pfl_config_t *c,
     pfl_t *f = (pfl_t *)arena;
     float *next = (float *)(void *)((unsigned char *)arena + PFL_CONTROL_BYTES);
     f->config = c;
+#if PFL_GUARD_CONFIG == 2
+    f->original = c;
+#endif
     f->stride = (uint32_t)stride;
     f->mean = next;
     f->best = f->mean + d;

@@ -2,7 +2,7 @@
  *
  * With retries predict.c keeps a batch as it was before its move. Those that landed outside are gathered from there, close
  * together, moved again with new noise, and those that are inside now go back to their places. */
-#include "core.h"
+#include "guard.h"
 
 /* Flags and indices live in the work column that no noise uses. */
 static uint32_t *flags_of(pfl_t *f)
@@ -40,6 +40,7 @@ static uint32_t list_outside(pfl_t *f, uint32_t first, uint32_t n)
     const pfl_view_t view = {&f->x[first], f->stride, first, n};
     uint32_t *list = flags_of(f);
     f->config->constraint->inside(user_of(f), &view, list);
+    pfl_guard_after_callback(f);
     return places(list, n);
 }
 
@@ -61,6 +62,7 @@ static void try_again(pfl_t *f, const void *u, float dt_s, uint32_t first, uint3
         pfl_rng_normals(&f->rng, &f->work[(size_t)q * PFL_BATCH], (listed + (PFL_GROUP - 1u)) / PFL_GROUP);
     }
     f->config->predict(f->config->user, u, dt_s, &batch);
+    pfl_guard_after_callback(f);
     for (uint32_t d = 0u; d < states; d++) {
         float *x = &f->x[((size_t)d * f->stride) + first];
         for (uint32_t k = 0u; k < listed; k++) {
@@ -81,6 +83,7 @@ void pfl_constraint_keep(pfl_t *f, const void *u, float dt_s, uint32_t first, ui
     if (outside > 0u) {
         const pfl_batch_t batch = pfl_batch_at(f, first, n);
         constraint->project(user_of(f), &batch);
+        pfl_guard_after_callback(f);
         pfl_count(&f->projected, outside);
     }
 }

@@ -16,6 +16,11 @@
 
 #include "bits.h"
 
+/* The guards' switches: guard.h. */
+#ifndef PFL_GUARD_CONFIG
+#define PFL_GUARD_CONFIG 1
+#endif
+
 #define PFL_COPY_WORDS 112u   /* room for the sealed part of the control block on 64-bit machines */
 #define PFL_ALIVE 0x70666C79u /* "pfly": the arena holds a filter */
 #define PFL_GROUP 16u         /* particles in the first batch of a predict, which decides whether to go on */
@@ -69,6 +74,9 @@ struct pfl {
     float *scratch;    /* column */
     float *best;       /* D: state of the most likely particle */
     float *retry;      /* PFL_BATCH x 2 D: a batch before its move, and a new attempt; null without retries */
+#if PFL_GUARD_CONFIG == 2
+    const pfl_config_t *original; /* the caller's; `config` is the filter's own copy of it */
+#endif
 
     float *mean;                /* D */
     float *centre;              /* D: what moments are taken about */
@@ -78,6 +86,9 @@ struct pfl {
     float *kernel_cov;          /* D (D + 1) / 2: its covariance, then the root of it */
     pfl_sensor_track_t *sensor; /* sensor_count; null without a watch */
     uint32_t config_hash, parts_hash, limits_hash;
+#if PFL_GUARD_CONFIG == 2
+    uint32_t copy_hash;
+#endif
     uint64_t t_us;
 
     uint64_t reset_t_us;
@@ -145,6 +156,10 @@ pfl_status_t pfl_fault(pfl_t *f, pfl_status_t status);
     assigns *counter;
     ensures *counter == \min(\old(*counter) + more, 0xFFFFFFFF); */
 void pfl_count(uint32_t *counter, uint32_t more);
+
+/* config_copy.c: a copy of a configuration and of all that it points to, but for user data; only with PFL_GUARD_CONFIG 2 */
+size_t pfl_config_copy_bytes(const pfl_config_t *c);
+const pfl_config_t *pfl_config_copy(const pfl_config_t *c, void *at);
 
 /* predict.c */
 uint32_t pfl_quarantine(pfl_t *f, uint32_t first, uint32_t n);

@@ -16,7 +16,15 @@
 #define CONSTANT_WORDS (offsetof(struct pfl, reset_t_us) / 4u)
 #define LOOP_WORDS (offsetof(struct pfl, mean) / sizeof(uintptr_t))
 
+/* What the caller's configuration is called; with a copy of it, `config` is that. */
+#if PFL_GUARD_CONFIG == 2
+#define ORIGINAL(f) ((f)->original)
+#else
+#define ORIGINAL(f) ((f)->config)
+#endif
+
 /* No byte without a name: what is only padding may differ from copy to copy of a structure. */
+typedef char pfl_config_has_no_gap[(offsetof(pfl_config_t, seed) == (offsetof(pfl_config_t, unused) + 8u)) ? 1 : -1];
 typedef char pfl_sensor_has_no_gap[(sizeof(pfl_sensor_t) == ((3u * sizeof(void *)) + 16u)) ? 1 : -1];
 typedef char pfl_constraint_has_no_gap[(sizeof(pfl_constraint_t) == ((4u * sizeof(void *)) + 8u)) ? 1 : -1];
 typedef char pfl_watch_has_no_gap[(sizeof(pfl_watch_t) == ((2u * sizeof(void *)) + 24u)) ? 1 : -1];
@@ -79,10 +87,52 @@ static bool config_is_intact(const pfl_t *f)
     if (PFL_GUARD_CONFIG == 0) {
         return true;
     }
-    const uint32_t hash = hash_words(1u, f->config, CONFIG_WORDS);
-    return (hash == f->config_hash) && (hash_of_parts(hash, f->config) == f->parts_hash) &&
-           (hash_of_limits(hash, f->config) == f->limits_hash);
+    const pfl_config_t *c = ORIGINAL(f);
+    const uint32_t hash = hash_words(1u, c, CONFIG_WORDS);
+    return (hash == f->config_hash) && (hash_of_parts(hash, c) == f->parts_hash) &&
+           (hash_of_limits(hash, c) == f->limits_hash);
 }
+
+/* ---- Its copy, with PFL_GUARD_CONFIG 2, at the end of the arena --------------------------------------------------- */
+
+#if PFL_GUARD_CONFIG == 2
+static void start_copy(pfl_t *f)
+{
+    const size_t bytes = pfl_config_copy_bytes(f->original);
+    f->config = pfl_config_copy(f->original, (unsigned char *)f + (pfl_arena_bytes(f->original) - bytes));
+    f->copy_hash = hash_words(1u, f->config, bytes / 4u);
+}
+
+static bool copy_is_intact(const pfl_t *f)
+{
+    return hash_words(1u, f->config, pfl_config_copy_bytes(f->original) / 4u) == f->copy_hash;
+}
+
+/* The same content in the same place, if the original still has it: pointers into the copy stay good. */
+static void renew_copy(pfl_t *f)
+{
+    if (config_is_intact(f)) {
+        const ptrdiff_t place = (const unsigned char *)f->config - (const unsigned char *)f;
+        (void)pfl_config_copy(f->original, (unsigned char *)f + place);
+    }
+}
+#else
+static void start_copy(const pfl_t *f)
+{
+    (void)f;
+}
+
+static bool copy_is_intact(const pfl_t *f)
+{
+    (void)f;
+    return true;
+}
+
+static void renew_copy(const pfl_t *f)
+{
+    (void)f;
+}
+#endif
 
 /* ---- Control block -------------------------------------------------------------------------------------------- */
 
@@ -147,6 +197,7 @@ void pfl_guard_after_callback(pfl_t *f)
     if (different != 0u) {
         mend_constants(f);
     }
+    renew_copy(f);
 }
 
 void pfl_guard_take_over(pfl_t *f)
@@ -234,9 +285,11 @@ PFL_NOINLINE static bool set_canaries(const pfl_t *f)
 
 void pfl_guard_start(pfl_t *f)
 {
-    f->config_hash = hash_words(1u, f->config, CONFIG_WORDS);
-    f->parts_hash = hash_of_parts(f->config_hash, f->config);
-    f->limits_hash = hash_of_limits(f->config_hash, f->config);
+    const pfl_config_t *c = ORIGINAL(f);
+    f->config_hash = hash_words(1u, c, CONFIG_WORDS);
+    f->parts_hash = hash_of_parts(f->config_hash, c);
+    f->limits_hash = hash_of_limits(f->config_hash, c);
+    start_copy(f);
     (void)set_canaries(f);
     seal(f);
 }
@@ -247,7 +300,10 @@ pfl_status_t pfl_guard_look(const pfl_t *f)
     if (damage != INTACT) {
         return PFL_ERR_CORRUPT;
     }
-    return config_is_intact(f) ? PFL_OK : PFL_ERR_CONFIG;
+    if (!config_is_intact(f)) {
+        return PFL_ERR_CONFIG;
+    }
+    return copy_is_intact(f) ? PFL_OK : PFL_ERR_CORRUPT;
 }
 
 pfl_status_t pfl_guard_open(pfl_t *f)
@@ -266,6 +322,7 @@ pfl_status_t pfl_guard_open(pfl_t *f)
     }
     f->watched.event |= ((f->watched.fault & PFL_FAULT_CONFIG) != 0u) ? PFL_EVENT_MENDED : 0u;
     f->watched.fault &= ~PFL_FAULT_CONFIG;
+    renew_copy(f);
     f->open = OPEN;
     return PFL_OK;
 }

@@ -1,7 +1,10 @@
 /* The guards against memory that changes by itself and callbacks that write where they should not: which of them are
  * built in, and what each costs where it is not.
  *
- *   PFL_GUARD_CONFIG    the configuration, by a hash of its bytes, at the start of every call
+ *   PFL_GUARD_CONFIG    the configuration, by a hash of its bytes, at the start of every call. With 2 for a
+ *                       configuration in RAM: the filter lives on a copy of it, which is made anew after each callback, so
+ *                       that what changes in either during a call does no harm; the arena is larger by the copy, and
+ *                       pfl_arena_bytes, not PFL_ARENA_BYTES, tells its size
  *   PFL_GUARD_CONTROL   the control block, by a sealed copy, at the start and end of every call, and the part that never
  *                       changes after each callback
  *   PFL_GUARD_CANARIES  words between the columns of the arena, at the end of every call, and around what a
@@ -9,15 +12,12 @@
  *   PFL_GUARD_VIEW      a log-likelihood callback sees a copy of the particles: for one that casts the const away
  *
  * The first three are on unless the compiler is told -DPFL_GUARD_...=0, the last, which costs as much as the others
- * together, is off unless it is told =1. The layout of the arena does not depend on them. */
+ * together, is off unless it is told =1. The layout of the arena does not depend on them but for PFL_GUARD_CONFIG 2. */
 #ifndef PFL_GUARD_H
 #define PFL_GUARD_H
 
 #include "core.h"
 
-#ifndef PFL_GUARD_CONFIG
-#define PFL_GUARD_CONFIG 1
-#endif
 #ifndef PFL_GUARD_CONTROL
 #define PFL_GUARD_CONTROL 1
 #endif

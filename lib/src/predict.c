@@ -8,11 +8,15 @@
 
 PFL_NOINLINE static bool particle_is_finite(const pfl_t *f, uint32_t i)
 {
-    bool finite = true;
-    for (uint32_t d = 0u; d < f->config->states; d++) {
-        finite = finite && pfl_is_finite(f->x[((size_t)d * f->stride) + i]);
-    }
-    return finite;
+    const float *x = &f->x[i];
+    uint32_t left = f->config->states;
+    uint32_t broken = 0u;
+    do {
+        broken |= pfl_is_finite(*x) ? 0u : 1u;
+        x += f->stride;
+        left--;
+    } while (left > 0u);
+    return broken == 0u;
 }
 
 uint32_t pfl_count_nonfinite(const pfl_t *f, uint32_t first, uint32_t n)

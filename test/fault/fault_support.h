@@ -9,6 +9,8 @@
 
 #define FT_N 96u
 #define FT_STEP_US 100000u
+#define FT_CONFIG_BYTES                                                                                                \
+    (offsetof(pfl_config_t, user) + sizeof(void *)) /* with a name: 32-bit machines pad behind them */
 
 typedef struct {
     pfl_watch_t watch;

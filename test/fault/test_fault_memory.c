@@ -8,6 +8,14 @@
 #include <math.h>
 #include <string.h>
 
+#ifdef PFL_TEST_ON_TARGET /* emulated */
+#define RESAMPLINGS 2000u
+#define TRIALS 5u /* at each place */
+#else
+#define RESAMPLINGS 20000u
+#define TRIALS 25u
+#endif
+
 static ft_t t;
 
 void setUp(void)
@@ -99,7 +107,7 @@ void test_C1_every_flipped_bit_of_configuration_sensors_and_watch_is_seen_before
     ft_start(&t);
     ft_cycles(&t, 5u, 0.0f);
     const unsigned char *before = ut_snapshot(t.f);
-    every_bit_is_seen(&t.config, sizeof t.config);
+    every_bit_is_seen(&t.config, FT_CONFIG_BYTES);
     every_bit_is_seen(t.sensors, sizeof t.sensors);
     every_bit_is_seen(&t.watch, sizeof t.watch);
     TEST_ASSERT_TRUE(ut_same_posterior(before, ut_snapshot(t.f), pfl_snapshot_bytes(t.f)));
@@ -249,7 +257,7 @@ static void struck_predict(void *user, const void *u, float dt_s, const pfl_batc
 static void strike(uint32_t pattern, bool inside)
 {
     uint64_t state = 1000u + pattern;
-    for (uint32_t trial = 0u; trial < (25u * (uint32_t)PLACES); trial++) {
+    for (uint32_t trial = 0u; trial < (TRIALS * (uint32_t)PLACES); trial++) {
         const place_t place = (place_t)(trial % (uint32_t)PLACES);
         if (inside && (place == HEADER) && (pattern != 0u)) {
             continue; /* two flips in block and copy within one callback: tools/survival counts them */
@@ -298,7 +306,7 @@ void test_R2_damaged_log_weights_of_any_bits_never_make_a_resampling_leave_its_a
     ft_configure(&t);
     ft_start(&t);
     ft_cycles(&t, 3u, 0.0f);
-    for (uint32_t k = 0u; k < 20000u; k++) {
+    for (uint32_t k = 0u; k < RESAMPLINGS; k++) {
         pfl_weights_settle(t.f);
         const float bad = ut_float(ut_random(&state));
         t.f->log_weight[ut_random(&state) % FT_N] = bad;
@@ -336,4 +344,24 @@ void test_R4_damaged_truncated_and_foreign_snapshots_are_refused(void)
     }
     TEST_ASSERT_EQUAL_INT(PFL_ERR_CORRUPT, pfl_restore(t.f, blob, bytes));
     TEST_ASSERT_TRUE(ut_same_posterior(before, ut_snapshot(t.f), bytes));
+}
+
+void test_R4_a_restored_filter_of_any_size_resamples_as_the_original_does(void)
+{
+    static const uint32_t counts[4] = {1u, 90u, 95u, 96u}; /* with and without padding */
+    for (uint32_t k = 0u; k < 4u; k++) {
+        ft_configure(&t);
+        t.config.particles = counts[k];
+        t.config.ess_ratio = 0.0f;
+        pfl_t *a = ut_filter(&t.config);
+        pfl_t *b = ut_filter(&t.config);
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_resample(a)); /* equal weights, and lists where the log-weights were */
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_resample(b));
+        memset(b->log_weight, 0, sizeof(float) * PFL_CEIL8(counts[k])); /* a list may hold any index */
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_restore(b, ut_snapshot(a), pfl_snapshot_bytes(a)));
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_resample(a));
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_resample(b));
+        TEST_ASSERT_TRUE(ut_same_bytes(ut_snapshot(a), ut_snapshot(b), pfl_snapshot_bytes(a)));
+        ut_arenas_end();
+    }
 }

@@ -17,8 +17,7 @@
 #define SENSORS 3u
 #define ARENA_MAX (PFL_ARENA_BYTES(PARTICLES, STATES, STATES) + PFL_RETRY_BYTES(STATES) + PFL_WATCH_BYTES(SENSORS))
 #define CALLS_MAX 48u
-#define FLIP_WEIGHTS false /* not yet: what resampling and quantiles make of a weight beyond 1 is undefined */
-#define DEPTH 2u           /* a callback may call another filter, whose callbacks call none */
+#define DEPTH 2u /* a callback may call another filter, whose callbacks call none */
 
 typedef struct {
     pfl_config_t config;
@@ -658,10 +657,8 @@ static void flip_guarded(slot_t *s, size_t offset, uint8_t bit)
     const size_t other = (offset + take_u16(&world.in)) % offsetof(struct pfl, rng);
     bytes[offset] ^= (unsigned char)(1u << (bit & 7u));
     bytes[other] ^= twice ? (unsigned char)(1u << ((bit >> 3) & 7u)) : 0u;
-    if (offset < offsetof(struct pfl, open)) {
-        if (!twice) {
-            read_all(s, PFL_ERR_CORRUPT);
-        }
+    if (!twice && (offset < offsetof(struct pfl, seal))) { /* block and copy agree that a damaged seal is wrong */
+        read_all(s, PFL_ERR_CORRUPT);
     }
     const pfl_status_t status = pfl_update(s->f, 0u, 0u, NULL);
     REQUIRE((status == PFL_ERR_ARG) || (twice && (status == PFL_ERR_CORRUPT)));
@@ -676,13 +673,6 @@ static void flip_guarded(slot_t *s, size_t offset, uint8_t bit)
     }
 }
 
-static bool is_weight(const pfl_t *f, const unsigned char *byte)
-{
-    const float *first = (f->log_weight < f->scratch) ? f->log_weight : f->scratch;
-    const float *end = ((f->log_weight < f->scratch) ? f->scratch : f->log_weight) + f->stride;
-    return (byte >= (const unsigned char *)first) && (byte < (const unsigned char *)end);
-}
-
 /* Anywhere, or the bit of a particle that turns what lies between 1 and 2 into what is not finite. */
 static void flip_unguarded(slot_t *s, size_t at, uint8_t how)
 {
@@ -691,10 +681,8 @@ static void flip_unguarded(slot_t *s, size_t at, uint8_t how)
     const bool number = (how & 16u) != 0u;
     unsigned char *byte = number ? ((unsigned char *)&s->f->x[at % numbers] + 3)
                                  : ((unsigned char *)s->arena + first + (at % (s->bytes - first)));
-    if (FLIP_WEIGHTS || !is_weight(s->f, byte)) {
-        *byte ^= (unsigned char)(number ? 0x40u : (1u << (how & 7u)));
-        s->worn = true;
-    }
+    *byte ^= (unsigned char)(number ? 0x40u : (1u << (how & 7u)));
+    s->worn = true;
 }
 
 static pfl_status_t do_flip(slot_t *s)
@@ -721,7 +709,7 @@ static pfl_status_t do_flip_config(slot_t *s)
     const struct {
         const void *at;
         size_t bytes;
-    } parts[] = {{c, sizeof *c},
+    } parts[] = {{c, offsetof(pfl_config_t, user) + sizeof c->user}, /* 32-bit machines pad behind it */
                  {setup->sensor, c->sensor_count * sizeof setup->sensor[0]},
                  {c->constraint, sizeof *c->constraint},
                  {c->kernel, sizeof *c->kernel},

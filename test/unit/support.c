@@ -39,7 +39,11 @@ void *ut_arena(size_t bytes)
 void *ut_arena_for(const pfl_config_t *config, size_t *bytes)
 {
     const size_t watch = (config->watch != NULL) ? PFL_WATCH_BYTES(config->sensor_count) : 0u;
+#if defined(PFL_GUARD_CONFIG) && (PFL_GUARD_CONFIG == 2)
+    const size_t needed = PFL_MAX(pfl_arena_bytes(config), watch); /* with the copy of a good configuration */
+#else
     const size_t needed = PFL_ARENA_BYTES(config->particles, config->states, config->noises) + watch;
+#endif
     if (bytes != NULL) {
         *bytes = needed;
     }

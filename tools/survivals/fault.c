@@ -86,9 +86,10 @@ static uint32_t kinds_of(region_t region)
     return ((uint32_t)region < MEMORY_REGIONS) ? (uint32_t)DAMAGES : special[(uint32_t)region - MEMORY_REGIONS];
 }
 
-const char *region_name(region_t region)
+const char *fault_region_name(const fault_t *f)
 {
-    return region_names[region];
+    const bool between = (f->region != REGION_CONFIG) || !f->inside;
+    return between ? region_names[f->region] : "configuration, in a callback";
 }
 
 const char *fault_kind_name(const fault_t *f)
@@ -156,7 +157,7 @@ fault_t fault_none(void)
 
 void fault_print(FILE *out, const fault_t *f)
 {
-    fprintf(out, "%s: %s, from cycle %u for %u", region_name(f->region), fault_kind_name(f), (unsigned)f->first,
+    fprintf(out, "%s: %s, from cycle %u for %u", fault_region_name(f), fault_kind_name(f), (unsigned)f->first,
             (unsigned)f->cycles);
     if (is_memory(f)) {
         fprintf(out, ", %s %u", f->inside ? "inside callback" : "between calls, place", (unsigned)f->point);
@@ -222,6 +223,20 @@ static uint32_t canary_spans(const pfl_t *f, span_t s[STATES + 3u])
     return STATES + 3u;
 }
 
+/* The filter's copy of its configuration, if it has one. */
+static uint32_t copy_span(pfl_t *f, span_t *s)
+{
+#if PFL_GUARD_CONFIG == 2
+    const ptrdiff_t place = (const unsigned char *)f->config - (const unsigned char *)f;
+    *s = span((unsigned char *)f + place, pfl_config_copy_bytes(f->original));
+    return 1u;
+#else
+    (void)f;
+    (void)s;
+    return 0u;
+#endif
+}
+
 static uint32_t spans_of(pfl_t *f, span_t s[STATES + 3u])
 {
     switch (fault.region) {
@@ -233,7 +248,7 @@ static uint32_t spans_of(pfl_t *f, span_t s[STATES + 3u])
         return 1u;
     case REGION_SEAL:
         s[0] = span(&f->seal, offsetof(struct pfl, rng) - offsetof(struct pfl, seal));
-        return 1u;
+        return 1u + copy_span(f, &s[1]);
     case REGION_TRACKS:
         s[0] = span(f->sensor, sizeof(pfl_sensor_track_t) * SENSORS);
         return (f->sensor != NULL) ? 1u : 0u;

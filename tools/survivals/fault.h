@@ -49,7 +49,7 @@ typedef struct {
 extern fault_t fault;             /* of this run */
 extern fault_state_t fault_state; /* and what became of it */
 
-const char *region_name(region_t region);
+const char *fault_region_name(const fault_t *f);
 const char *fault_kind_name(const fault_t *f);
 bool fault_lasts(const fault_t *f); /* to the end of the flight: nothing can recover from it */
 

@@ -74,9 +74,9 @@ static void trace_cycle(FILE *out, uint32_t k, const cycle_t *c, const instant_t
     for (uint32_t s = 0u; s < STATUSES; s++) {
         fprintf(out, " %d", (int)c->status[s]);
     }
-    fprintf(out, "  fault %03x reject %x mode %02x event %03x mended %u%s%s%s\n", (unsigned)c->health.fault,
+    fprintf(out, "  fault %03x reject %x mode %02x event %03x mended %u work %u%s%s%s\n", (unsigned)c->health.fault,
             (unsigned)c->health.reject, (unsigned)c->health.mode, (unsigned)c->health.event, (unsigned)c->health.mended,
-            judge_lies(c, instant) ? " OFF" : "", c->nonfinite ? " NONFINITE" : "",
+            (unsigned)c->work, judge_lies(c, instant) ? " OFF" : "", c->nonfinite ? " NONFINITE" : "",
             (k == fault.first) ? " <- fault" : "");
 }
 
@@ -158,17 +158,26 @@ static class_t verdict_of(const judgement_t *j, const reference_t *r, bool compl
     return (plane.hash_a == r->hash_a) ? CLASS_MASKED : CLASS_RECOVERED;
 }
 
+static uint64_t mixed_of(uint64_t run_seed)
+{
+    return (run_seed * 0x9E3779B97F4A7C15u) >> 40;
+}
+
+world_kind_t judge_draw(uint64_t run_seed)
+{
+    fault = fault_of_run(run_seed, FAULT_FIRST, FAULT_LAST, CYCLES);
+    return (world_kind_t)(mixed_of(run_seed) % WORLDS);
+}
+
 judgement_t judge_run(uint64_t run_seed, FILE *trace)
 {
     static double square[CYCLES];
-    const uint64_t mixed = (run_seed * 0x9E3779B97F4A7C15u) >> 40;
     judgement_t j;
     memset(&j, 0, sizeof j);
-    j.kind = (world_kind_t)(mixed % WORLDS);
-    const reference_t *r = &references[j.kind][(mixed / WORLDS) % FLIGHTS];
+    j.kind = judge_draw(run_seed);
+    const reference_t *r = &references[j.kind][(mixed_of(run_seed) / WORLDS) % FLIGHTS];
     memset(&fault_state, 0, sizeof fault_state);
     plane = r->warm;
-    fault = fault_of_run(run_seed, FAULT_FIRST, FAULT_LAST, CYCLES);
     const uint32_t window = window_of(&fault);
     bool complained = false;
     uint32_t lies = 0u;

@@ -34,6 +34,9 @@ bool judge_prepare(void);
 double judge_clean_rmse(world_kind_t kind);
 uint64_t judge_clean_work(world_kind_t kind);
 
+/* Draws the fault of a run, and says in which world it strikes. */
+world_kind_t judge_draw(uint64_t run_seed);
+
 /* Flies one run; with `trace` tells every cycle. */
 judgement_t judge_run(uint64_t run_seed, FILE *trace);
 

@@ -20,7 +20,7 @@ static bool number_of(const char *text, uint64_t *number)
 
 static void print_run(uint64_t run_seed, const judgement_t *j)
 {
-    printf("%" PRIu64 "|%s|%s|%s|%s|%d%d%d%d%d%d%d|%d|%.4g|%.4f\n", run_seed, region_name(fault.region),
+    printf("%" PRIu64 "|%s|%s|%s|%s|%d%d%d%d%d%d%d|%d|%.4g|%.4f\n", run_seed, fault_region_name(&fault),
            fault_kind_name(&fault), j->kind == WORLD_LAND ? "land" : "gps", class_name(j->verdict),
            j->nonfinite ? 1 : 0, j->fence ? 1 : 0, j->second ? 1 : 0, j->lie ? 1 : 0, j->late ? 1 : 0,
            j->usable ? 1 : 0, fault_state.struck ? 1 : 0, fault_lasts(&fault) ? 1 : 0, j->ratio, j->work);
@@ -46,6 +46,15 @@ static int replay(uint64_t run_seed)
     return 0;
 }
 
+/* What a run would be, for one that did not live to say it. */
+static int name(uint64_t run_seed)
+{
+    const world_kind_t kind = judge_draw(run_seed);
+    printf("%s|%s|%s|%d\n", fault_region_name(&fault), fault_kind_name(&fault), kind == WORLD_LAND ? "land" : "gps",
+           fault_lasts(&fault) ? 1 : 0);
+    return 0;
+}
+
 static int show_clean(void)
 {
     for (uint32_t kind = 0u; kind < WORLDS; kind++) {
@@ -57,7 +66,7 @@ static int show_clean(void)
 
 static int usage(void)
 {
-    fprintf(stderr, "pflight_survival: clean | runs FIRST COUNT | replay SEED | gates RUNS | soak HOURS\n");
+    fprintf(stderr, "pflight_survival: clean | runs FIRST COUNT | replay SEED | name SEED | gates RUNS | soak HOURS\n");
     return 2;
 }
 
@@ -73,6 +82,9 @@ int main(int argc, char **argv)
     }
     if ((strcmp(argv[1], "gates") == 0) && (argc == 3)) {
         return gates_fly((uint32_t)a);
+    }
+    if ((strcmp(argv[1], "name") == 0) && (argc == 3)) {
+        return name(a);
     }
     const bool known = ((strcmp(argv[1], "clean") == 0) && (argc == 2)) ||
                        ((strcmp(argv[1], "runs") == 0) && (argc == 4)) ||
