@@ -24,7 +24,7 @@
 #endif
 
 /* No byte without a name: what is only padding may differ from copy to copy of a structure. */
-typedef char pfl_config_has_no_gap[(offsetof(pfl_config_t, seed) == (offsetof(pfl_config_t, unused) + 8u)) ? 1 : -1];
+typedef char pfl_config_has_no_gap[(sizeof(uint32_t[CONFIG_WORDS]) == ((11u * sizeof(void *)) + 40u)) ? 1 : -1];
 typedef char pfl_sensor_has_no_gap[(sizeof(pfl_sensor_t) == ((3u * sizeof(void *)) + 16u)) ? 1 : -1];
 typedef char pfl_constraint_has_no_gap[(sizeof(pfl_constraint_t) == ((4u * sizeof(void *)) + 8u)) ? 1 : -1];
 typedef char pfl_watch_has_no_gap[(sizeof(pfl_watch_t) == ((2u * sizeof(void *)) + 24u)) ? 1 : -1];

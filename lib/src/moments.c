@@ -32,8 +32,6 @@ typedef struct {
     const float *centre;
 } columns_t;
 
-static const float no_centre[PFL_STATES_MAX];
-
 /* As many rows, from `row` on, grow by w (x - centre). */
 PFL_NOINLINE static void product_lanes(const pfl_t *f, uint32_t row, const float *w, const columns_t *of, uint32_t n)
 {
@@ -89,6 +87,7 @@ static void full_lanes(pfl_t *f, uint32_t first, uint32_t n)
     const uint32_t states = f->config->states;
     const float *w = &f->scratch[first];
     float *restrict weighted = &f->work[(size_t)states * PFL_BATCH];
+    static const float no_centre[PFL_STATES_MAX] = {0.0f};
     columns_t of = {f->work, PFL_BATCH, states, no_centre};
     for (uint32_t d = 0u; d < states; d++) {
         deviations(f, d, &f->x[((size_t)d * f->stride) + first], n);

@@ -173,7 +173,7 @@ pfl_status_t pfl_self_test(void *arena, size_t arena_bytes)
     uint64_t different = hash_of_arithmetic(seed) ^ ANSWER_ARITHMETIC;
     different |= hash_of_math(seed) ^ ANSWER_MATH;
     different |= hash_of_random(seed, (float *)arena) ^ ANSWER_RANDOM;
-    for (uint32_t k = 0u; k < (sizeof schemes / sizeof schemes[0]); k++) {
+    for (uint32_t k = 0u; k < (sizeof(schemes) / sizeof(schemes[0])); k++) {
         fly(arena, schemes[k], &flight);
     }
     different |= flight ^ ANSWER_FLIGHT;

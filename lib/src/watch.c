@@ -69,15 +69,15 @@ static bool has_complaint(const pfl_t *f)
  * cloud in the wrong place: a velocity does not tell where it is. */
 static bool is_misplaced(const pfl_t *f, uint32_t rejects)
 {
-    bool refused = false;
+    bool any_against = false;
     for (uint32_t k = 0u; k < f->config->sensor_count; k++) {
         const bool against = f->sensor[k].refused >= rejects;
         if ((f->config->sensors[k].redraw != NULL) && !against && !sensor_is_stale(f, k)) {
             return false;
         }
-        refused = refused || (against && (f->config->sensors[k].redraw != NULL));
+        any_against = any_against || (against && (f->config->sensors[k].redraw != NULL));
     }
-    return refused;
+    return any_against;
 }
 
 static bool is_lost(const pfl_t *f)

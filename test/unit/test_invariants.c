@@ -2,7 +2,7 @@
  * end of their range. White box: the only tests that reach into the control block. */
 #include "support.h"
 
-#include "core.h"
+#include "guard.h"
 #include "rng_kernels.h"
 
 #include "unity.h"
@@ -57,10 +57,12 @@ void test_damage_of_the_control_block_is_seen(void)
 
 void test_damage_of_the_configuration_is_seen(void)
 {
+#if PFL_GUARD_CONTROL /* nothing else knows that a pointer is wrong */
     const pfl_config_t *good = f->config;
     f->config = NULL;
     TEST_ASSERT_FALSE(pfl_invariants_hold(f));
     f->config = good;
+#endif
     seen_in_word(&config.particles, 0u);
 }
 
@@ -169,4 +171,94 @@ void test_a_damaged_log_weight_weighs_nothing(void)
     (void)pfl_moments(f, false);
     TEST_ASSERT_TRUE((f->ess >= 1.0f) && (f->ess < whole));
     TEST_ASSERT_EQUAL_HEX32(0u, ut_bits(f->scratch[5]));
+}
+
+/* ---- What lies in the arena without a copy, damaged there -------------------------------------------------------- */
+
+void test_damaged_moments_are_computed_anew(void)
+{
+    float mean[2];
+    float cov[4];
+    float again[2];
+    float again_cov[4];
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_estimate(f, mean, cov));
+    float *const places[] = {&f->mean[0], &f->mean[1], &f->cov[0], &f->cov[1], &f->cov[2]};
+    for (uint32_t k = 0u; k < 5u; k++) {
+        *places[k] = ((k & 1u) != 0u) ? ut_infinity() : ut_nan(false);
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_estimate(f, again, again_cov));
+        TEST_ASSERT_EQUAL_MEMORY(mean, again, sizeof mean);
+        TEST_ASSERT_EQUAL_MEMORY(cov, again_cov, sizeof cov);
+    }
+}
+
+/* A number that no longer means anything does not disturb those that do. */
+void test_without_a_covariance_nobody_looks_at_its_place(void)
+{
+    float mean[2];
+    config.moments = (uint16_t)PFL_MOMENTS_MEAN;
+    f = ut_filter(&config);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_estimate(f, mean, NULL));
+    f->mean[0] = 123.0f; /* handed out as long as nothing asks for new ones */
+    f->cov[0] = ut_nan(false);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_estimate(f, mean, NULL));
+    TEST_ASSERT_EQUAL_FLOAT(123.0f, mean[0]);
+}
+
+void test_a_damaged_most_likely_particle_is_not_handed_out(void)
+{
+    float state[2] = {7.0f, 8.0f};
+    for (uint32_t d = 0u; d < 2u; d++) {
+        const float kept = f->best[d];
+        f->best[d] = ut_nan(d != 0u);
+        TEST_ASSERT_EQUAL_INT(PFL_ERR_CORRUPT, pfl_most_likely(f, state));
+        TEST_ASSERT_EQUAL_FLOAT(7.0f, state[0]);
+        TEST_ASSERT_EQUAL_FLOAT(8.0f, state[1]);
+        f->best[d] = kept;
+    }
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_most_likely(f, state));
+    TEST_ASSERT_EQUAL_MEMORY(f->best, state, sizeof state);
+}
+
+void test_a_quantile_at_a_damaged_particle_is_refused(void)
+{
+    float value = 7.0f;
+    f->x[4] = ut_nan(false); /* sorts behind all others */
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_NONFINITE, pfl_quantile(f, 0u, 1.0f, &value));
+    TEST_ASSERT_EQUAL_FLOAT(7.0f, value);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_quantile(f, 0u, 0.5f, &value));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_quantile(f, 1u, 1.0f, &value));
+}
+
+/* All weights lost: the quantiles are those of equal ones. */
+void test_quantiles_survive_the_loss_of_every_weight(void)
+{
+    pfl_health_t health;
+    for (uint32_t i = 0u; i < N; i++) {
+        f->x[i] = (float)i;
+        f->log_weight[i] = ut_nan((i & 1u) != 0u);
+    }
+    for (uint32_t i = 1u; i <= N; i++) {
+        float value = -1.0f;
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_quantile(f, 0u, ((float)i - 0.5f) / (float)N, &value));
+        TEST_ASSERT_EQUAL_FLOAT((float)(i - 1u), value);
+    }
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_health(f, &health));
+    TEST_ASSERT_EQUAL_UINT32(N, health.mended);
+    TEST_ASSERT_TRUE((health.event & PFL_EVENT_MENDED) != 0u);
+    TEST_ASSERT_TRUE(pfl_invariants_hold(f));
+}
+
+void test_a_damaged_jump_is_not_handed_out(void)
+{
+    float delta[2] = {7.0f, 8.0f};
+    uint32_t count = 9u;
+    for (uint32_t d = 0u; d < 2u; d++) {
+        f->delta[d] = ut_infinity();
+        TEST_ASSERT_EQUAL_INT(PFL_ERR_CORRUPT, pfl_last_reset(f, &count, NULL, delta));
+        f->delta[d] = 0.0f;
+    }
+    TEST_ASSERT_EQUAL_UINT32(9u, count);
+    TEST_ASSERT_EQUAL_FLOAT(7.0f, delta[0]);
+    TEST_ASSERT_EQUAL_FLOAT(8.0f, delta[1]);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_last_reset(f, &count, NULL, delta));
 }

@@ -6,6 +6,7 @@
 
 #include "unity.h"
 
+#include <float.h>
 #include <math.h>
 #include <string.h>
 
@@ -185,6 +186,17 @@ void test_the_configured_refusals_and_times_count(void)
     TEST_ASSERT_EQUAL_INT(PFL_PHASE_LOST, health_of(f).phase);
 }
 
+/* Only a sensor that could place the cloud anew tells by its own refusals that it is misplaced. */
+void test_the_refusals_of_one_sensor_without_redraw_do_not_lose_it(void)
+{
+    pfl_t *f = tracking();
+    for (uint32_t k = 0u; k < 6u; k++) {
+        TEST_ASSERT_EQUAL_INT(PFL_REJECTED, cycle(f, 100.0f));
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_update(f, 1u, now_us, dictated));
+        TEST_ASSERT_TRUE(health_of(f).phase != PFL_PHASE_LOST);
+    }
+}
+
 void test_a_reset_before_anything_was_fused_is_no_news(void)
 {
     pfl_t *f = ut_filter(&config);
@@ -252,6 +264,17 @@ void test_the_share_of_all_reinjects_the_whole_cloud(void)
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_estimate(f, mean, NULL));
     TEST_ASSERT_EQUAL_FLOAT(100.0f, mean[0]);
     TEST_ASSERT_TRUE(pfl_invariants_hold(f));
+}
+
+void test_more_than_a_batch_is_reinjected_batch_by_batch(void)
+{
+    config.particles = PFL_BATCH + 72u;
+    config.sensor_count = 1u; /* the other dictates N only */
+    pfl_t *f = kidnapped(0.9f, NULL);
+    TEST_ASSERT_EQUAL_UINT32(180u, redrawn); /* 90 % of 200 */
+    for (uint32_t i = 0u; i < config.particles; i++) {
+        TEST_ASSERT_TRUE((f->x[i] >= 99.0f) == (i >= 20u));
+    }
 }
 
 void test_without_any_source_of_states_nothing_is_reinjected(void)
@@ -335,6 +358,15 @@ void test_scrub_counts_what_lies_below_its_box_and_mends_without_one(void)
     TEST_ASSERT_EQUAL_FLOAT(0.0f, f->best[0]);
 }
 
+void test_a_damaged_ratio_of_a_sensor_is_told_as_the_worst_there_is(void)
+{
+    pfl_sensor_health_t health;
+    pfl_t *f = tracking();
+    f->sensor[0].test_ratio = ut_nan(false);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_sensor_health(f, 0u, &health));
+    TEST_ASSERT_EQUAL_HEX32(ut_bits(FLT_MAX), ut_bits(health.test_ratio));
+}
+
 /* ---- Snapshots and forks ----------------------------------------------------------------------------------------- */
 
 void test_a_snapshot_keeps_what_the_watch_knows(void)
@@ -396,6 +428,26 @@ void test_a_snapshot_whose_ratio_of_a_sensor_is_not_finite_is_refused(void)
         f->sensor[k].test_ratio = kept;
         TEST_ASSERT_EQUAL_INT(PFL_ERR_CORRUPT, pfl_restore(f, lie, pfl_snapshot_bytes(f)));
     }
+}
+
+/* The mask of refused sensors has a bit for each, and the last is the word's last. */
+void test_a_snapshot_of_as_many_sensors_as_there_can_be_is_restored(void)
+{
+    static pfl_sensor_t many[32];
+    const float far_off = 100.0f;
+    for (uint32_t k = 0u; k < 32u; k++) {
+        many[k] = sensors[0];
+    }
+    config.sensors = many;
+    config.sensor_count = 32u;
+    pfl_t *f = tracking();
+    move(f);
+    TEST_ASSERT_EQUAL_INT(PFL_REJECTED, pfl_update(f, 31u, now_us, &far_off));
+    TEST_ASSERT_EQUAL_HEX32(0x80000000u, health_of(f).reject);
+    const unsigned char *kept = ut_snapshot(f);
+    pfl_t *g = ut_filter(&config);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_restore(g, kept, pfl_snapshot_bytes(g)));
+    TEST_ASSERT_EQUAL_HEX32(0x80000000u, health_of(g).reject);
 }
 
 void test_a_fork_has_tracks_of_its_own(void)

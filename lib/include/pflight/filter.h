@@ -207,7 +207,6 @@ typedef struct {
     uint32_t circular_mask; /* bit d set: state d is an angle in rad, averaged on the circle: needs `circular`. Wrapped
                                 in estimates, never in the particles */
     float ess_ratio;        /* resample when the effective sample size < ess_ratio N; 0: never, 1: always; 0.5 usual */
-    uint32_t unused[2];     /* 0, as above */
     uint64_t seed;          /* any value; the same seed replays the same run */
     uint32_t
         dt_max_us; /* longest model step; a longer one is cut into up to PFL_SUBSTEPS_MAX; 0: no limit but 2^32 us, 71 minutes */
