@@ -21,6 +21,8 @@ set(PFLIGHT_LIB_SOURCES
   predict.c
   constraint.c
   kernel.c
+  regularised.c
+  tempered.c
   weights.c
   resample.c
   resample_schemes.c
@@ -74,9 +76,11 @@ set(PFLIGHT_LIB_HEADERS
   per_particle.h
   port.h
   proposal.h
+  regularised.h
   rng.h
   sensors.h
   status.h
+  tempered.h
   waypoints.h
 )
 list(TRANSFORM PFLIGHT_LIB_HEADERS PREPEND "${PFLIGHT_INCLUDE_DIR}/pflight/")

@@ -13,9 +13,11 @@
 #include "pflight/per_particle.h"
 #include "pflight/port.h"
 #include "pflight/proposal.h"
+#include "pflight/regularised.h"
 #include "pflight/rng.h"
 #include "pflight/sensors.h"
 #include "pflight/status.h"
+#include "pflight/tempered.h"
 #include "pflight/waypoints.h"
 
 #endif
