@@ -57,6 +57,9 @@ set(PFLIGHT_LIB_SOURCES
   model_turn.c
   sensor_coloured.c
   sensor_velocity.c
+  error_laws.c
+  sensor_errors.c
+  model_drift.c
   guidance_waypoint.c
   antithetic.c
   proposal_linear.c
@@ -68,6 +71,7 @@ set(PFLIGHT_LIB_HEADERS
   antithetic.h
   clock.h
   constraints.h
+  errors.h
   filter.h
   guidance.h
   health.h

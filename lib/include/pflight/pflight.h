@@ -5,6 +5,7 @@
 #include "pflight/antithetic.h"
 #include "pflight/clock.h"
 #include "pflight/constraints.h"
+#include "pflight/errors.h"
 #include "pflight/filter.h"
 #include "pflight/guidance.h"
 #include "pflight/health.h"
