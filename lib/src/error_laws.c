@@ -55,19 +55,25 @@ void pfl_split_law(const void *law, float *values, uint32_t n)
     }
 }
 
+/* The logarithm of a sum of exponentials, with the larger taken out: nothing underflows. */
 void pfl_mixture_law(const void *law, float *values, uint32_t n)
 {
     const pfl_mixture_law_t *l = (const pfl_mixture_law_t *)law;
     const float inv_sigma = l->inv_sigma;
-    const float narrow = -0.5f * l->narrow;
-    const float below = l->height[0];
-    const float above = l->height[1];
-    const float most = pfl_log_kernel(1.0f + ((below > above) ? below : above));
+    const float narrow = 0.5f * l->narrow;
+    const float below = pfl_log_kernel(l->height[0]);
+    const float above = pfl_log_kernel(l->height[1]);
+    const float most = pfl_log_kernel(1.0f + ((l->height[0] > l->height[1]) ? l->height[0] : l->height[1]));
     for (uint32_t i = 0u; i < n; i++) {
         const float height = pfl_select(pfl_bits(values[i]) >> 31, below, above);
         const float y = values[i] * inv_sigma;
-        const float y2 = y * y;
-        const float density = pfl_exp_kernel(-0.5f * y2) + (height * pfl_exp_kernel(narrow * y2));
-        values[i] = pfl_log_kernel(density) - most;
+        const int32_t finite = -(int32_t)(pfl_bits(y * y) != 0x7F800000); /* an infinity times narrow = 0 were NaN */
+        const float y2 = pfl_select(finite, y * y, FLT_MAX);
+        const float good = -0.5f * y2;
+        const float outlier = height - (narrow * y2);
+        const int32_t is_good = pfl_bits(outlier - good) >> 31;
+        const float larger = pfl_select(is_good, good, outlier);
+        const float apart = pfl_from_bits(pfl_bits(outlier - good) & 0x7FFFFFFF);
+        values[i] = (larger + pfl_log_kernel(1.0f + pfl_exp_kernel(-apart))) - most;
     }
 }
