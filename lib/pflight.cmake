@@ -23,6 +23,7 @@ set(PFLIGHT_LIB_SOURCES
   kernel.c
   regularised.c
   tempered.c
+  adaptive.c
   weights.c
   resample.c
   resample_schemes.c
@@ -68,6 +69,7 @@ list(TRANSFORM PFLIGHT_LIB_SOURCES PREPEND "${CMAKE_CURRENT_LIST_DIR}/src/")
 
 set(PFLIGHT_LIB_HEADERS
   pflight.h
+  adaptive.h
   antithetic.h
   clock.h
   constraints.h

@@ -2,6 +2,7 @@
 #ifndef PFLIGHT_PFLIGHT_H
 #define PFLIGHT_PFLIGHT_H
 
+#include "pflight/adaptive.h"
 #include "pflight/antithetic.h"
 #include "pflight/clock.h"
 #include "pflight/constraints.h"
