@@ -22,8 +22,10 @@ set(PFLIGHT_LIB_SOURCES
   constraint.c
   kernel.c
   regularised.c
+  scout.c
   tempered.c
   adaptive.c
+  auxiliary.c
   weights.c
   resample.c
   resample_schemes.c
@@ -71,6 +73,7 @@ set(PFLIGHT_LIB_HEADERS
   pflight.h
   adaptive.h
   antithetic.h
+  auxiliary.h
   clock.h
   constraints.h
   errors.h

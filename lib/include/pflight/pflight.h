@@ -4,6 +4,7 @@
 
 #include "pflight/adaptive.h"
 #include "pflight/antithetic.h"
+#include "pflight/auxiliary.h"
 #include "pflight/clock.h"
 #include "pflight/constraints.h"
 #include "pflight/errors.h"
