@@ -26,6 +26,8 @@ set(PFLIGHT_LIB_SOURCES
   tempered.c
   adaptive.c
   auxiliary.c
+  parents.c
+  jump.c
   weights.c
   resample.c
   resample_schemes.c
@@ -80,6 +82,7 @@ set(PFLIGHT_LIB_HEADERS
   filter.h
   guidance.h
   health.h
+  jump.h
   math.h
   models.h
   per_particle.h

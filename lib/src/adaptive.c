@@ -7,6 +7,7 @@
 
 #include "guard.h"
 #include "math_kernels.h"
+#include "parents.h"
 #include "resample.h"
 #include "rng_kernels.h"
 #include "sqrt_kernel.h"
@@ -99,29 +100,11 @@ static uint32_t list_parents(pfl_t *f, uint32_t total, uint32_t n)
     return parents;
 }
 
-static void gather(const pfl_t *f, uint32_t parents)
+/* What lies behind the last particle of a column weighs nothing, but is multiplied. */
+static void pad(const pfl_t *f, uint32_t n)
 {
     for (uint32_t d = 0u; d < f->config->states; d++) {
-        float *x = &f->x[(size_t)d * f->stride];
-        for (uint32_t k = 0u; k < parents; k++) {
-            x[k] = x[pfl_load_u32(&f->log_weight[k])]; /* which is k or behind it */
-        }
-    }
-}
-
-/* Copies behind the parents; the rest of the column is finite. */
-static void fill(const pfl_t *f, uint32_t parents, uint32_t n)
-{
-    for (uint32_t d = 0u; d < f->config->states; d++) {
-        float *x = &f->x[(size_t)d * f->stride];
-        float *slot = &x[parents];
-        for (uint32_t k = 0u; k < parents; k++) {
-            for (uint32_t left = pfl_load_u32(&f->scratch[k]); left > 1u; left--) {
-                *slot = x[k];
-                slot++;
-            }
-        }
-        memset(&x[n], 0, sizeof(float) * (f->stride - n));
+        memset(&f->x[((size_t)d * f->stride) + n], 0, sizeof(float) * (f->stride - n));
     }
 }
 
@@ -129,9 +112,10 @@ static void fill(const pfl_t *f, uint32_t parents, uint32_t n)
 static void resample_into(pfl_t *f, pfl_adaptive_t *a, uint32_t total, uint32_t n)
 {
     const uint32_t parents = list_parents(f, total, n);
-    gather(f, parents);
+    pfl_parents_gather(f, parents);
     move_columns(f, parents, n);
-    fill(f, parents, n);
+    pfl_parents_fill(f, parents);
+    pad(f, n);
     a->config.particles = n;
     f->best_index = 0u;
     f->ess = (f->ess < (float)n) ? f->ess : (float)n;
