@@ -21,6 +21,13 @@ set(PFLIGHT_LIB_SOURCES
   predict.c
   constraint.c
   kernel.c
+  regularised.c
+  scout.c
+  tempered.c
+  adaptive.c
+  auxiliary.c
+  parents.c
+  jump.c
   weights.c
   resample.c
   resample_schemes.c
@@ -56,6 +63,9 @@ set(PFLIGHT_LIB_SOURCES
   model_turn.c
   sensor_coloured.c
   sensor_velocity.c
+  error_laws.c
+  sensor_errors.c
+  model_drift.c
   guidance_waypoint.c
   antithetic.c
   proposal_linear.c
@@ -64,20 +74,26 @@ list(TRANSFORM PFLIGHT_LIB_SOURCES PREPEND "${CMAKE_CURRENT_LIST_DIR}/src/")
 
 set(PFLIGHT_LIB_HEADERS
   pflight.h
+  adaptive.h
   antithetic.h
+  auxiliary.h
   clock.h
   constraints.h
+  errors.h
   filter.h
   guidance.h
   health.h
+  jump.h
   math.h
   models.h
   per_particle.h
   port.h
   proposal.h
+  regularised.h
   rng.h
   sensors.h
   status.h
+  tempered.h
   waypoints.h
 )
 list(TRANSFORM PFLIGHT_LIB_HEADERS PREPEND "${PFLIGHT_INCLUDE_DIR}/pflight/")
