@@ -58,6 +58,8 @@ set(PFLIGHT_LIB_SOURCES
   guidance_waypoint.c
   antithetic.c
   proposal_linear.c
+  marginal_shared.c
+  marginal_each.c
 )
 list(TRANSFORM PFLIGHT_LIB_SOURCES PREPEND "${CMAKE_CURRENT_LIST_DIR}/src/")
 
@@ -69,6 +71,7 @@ set(PFLIGHT_LIB_HEADERS
   filter.h
   guidance.h
   health.h
+  marginal.h
   math.h
   models.h
   per_particle.h

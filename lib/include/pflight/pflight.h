@@ -8,6 +8,7 @@
 #include "pflight/filter.h"
 #include "pflight/guidance.h"
 #include "pflight/health.h"
+#include "pflight/marginal.h"
 #include "pflight/math.h"
 #include "pflight/models.h"
 #include "pflight/per_particle.h"
