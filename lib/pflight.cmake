@@ -21,6 +21,8 @@ set(PFLIGHT_LIB_SOURCES
   predict.c
   constraint.c
   kernel.c
+  regularised.c
+  tempered.c
   weights.c
   resample.c
   resample_schemes.c
@@ -55,6 +57,9 @@ set(PFLIGHT_LIB_SOURCES
   model_turn.c
   sensor_coloured.c
   sensor_velocity.c
+  error_laws.c
+  sensor_errors.c
+  model_drift.c
   guidance_waypoint.c
   antithetic.c
   proposal_linear.c
@@ -68,6 +73,7 @@ set(PFLIGHT_LIB_HEADERS
   antithetic.h
   clock.h
   constraints.h
+  errors.h
   filter.h
   guidance.h
   health.h
@@ -77,9 +83,11 @@ set(PFLIGHT_LIB_HEADERS
   per_particle.h
   port.h
   proposal.h
+  regularised.h
   rng.h
   sensors.h
   status.h
+  tempered.h
   waypoints.h
 )
 list(TRANSFORM PFLIGHT_LIB_HEADERS PREPEND "${PFLIGHT_INCLUDE_DIR}/pflight/")

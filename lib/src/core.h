@@ -20,6 +20,9 @@
 #define PFL_ALIVE 0x70666C79u /* "pfly": the arena holds a filter */
 #define PFL_GROUP 16u         /* particles in the first batch of a predict, which decides whether to go on */
 
+/* A little more than PFL_LOGLIK_MAX, which itself is legal: what remains of a legal log-likelihood is below zero. */
+#define PFL_LOGLIK_SHIFT 0.00097656262f
+
 /* Of pfl.moments_current. */
 #define MOMENTS_STALE 0u
 #define MOMENTS_CURRENT 1u

@@ -1,5 +1,6 @@
-/* The kernel step after resampling: copies move apart, mean and covariance stay. filter.h has the equation. */
-#include "core.h"
+/* The kernel step after resampling: copies move apart, mean and covariance stay. filter.h has the equation. Steps of other
+ * kernels (regularised.c) differ in the pull and in the shape of the noise. */
+#include "kernel.h"
 
 #include "math_kernels.h"
 #include "sqrt_kernel.h"
@@ -8,12 +9,6 @@
 static size_t at(size_t states, size_t d, size_t e)
 {
     return ((d * ((2u * states) - d + 1u)) / 2u) + (e - d);
-}
-
-static bool takes_part(const pfl_t *f, uint32_t d)
-{
-    const uint32_t mask = f->config->kernel->states_mask;
-    return (mask == 0u) || (((mask >> d) & 1u) != 0u);
 }
 
 /* Cholesky root of the covariance in place: C = U' U, U upper triangular. A state without spread of its own gets a row
@@ -27,7 +22,7 @@ PFL_NOINLINE static void root_in_place(const pfl_t *f, float *u)
         for (uint32_t k = 0u; k < d; k++) {
             rest -= u[at(states, k, d)] * u[at(states, k, d)];
         }
-        const bool spread = takes_part(f, d) && (rest > (whole * 1.0e-6f));
+        const bool spread = pfl_kernel_takes(f, d) && (rest > (whole * 1.0e-6f));
         const float pivot = spread ? pfl_sqrt_kernel(rest) : 0.0f;
         const float inverse = spread ? (1.0f / pivot) : 0.0f;
         u[at(states, d, d)] = pivot;
@@ -36,7 +31,7 @@ PFL_NOINLINE static void root_in_place(const pfl_t *f, float *u)
             for (uint32_t k = 0u; k < d; k++) {
                 sum -= u[at(states, k, d)] * u[at(states, k, e)];
             }
-            u[at(states, d, e)] = takes_part(f, e) ? (sum * inverse) : 0.0f;
+            u[at(states, d, e)] = pfl_kernel_takes(f, e) ? (sum * inverse) : 0.0f;
         }
     }
 }
@@ -56,11 +51,10 @@ static bool root_is_finite(const pfl_t *f)
     return pfl_is_finite(sum);
 }
 
-PFL_NOINLINE static void move_state(pfl_t *f, uint32_t d, uint32_t first, uint32_t n)
+PFL_NOINLINE static void move_state(pfl_t *f, uint32_t d, uint32_t first, uint32_t n, float pull)
 {
     const uint32_t states = f->config->states;
     const float width = f->config->kernel->width;
-    const float pull = 1.0f - pfl_sqrt_kernel(1.0f - (width * width));
     const float mean = f->kernel_mean[d];
     const bool circular = ((f->config->circular_mask >> d) & 1u) != 0u;
     float *restrict x = &f->x[((size_t)d * f->stride) + first];
@@ -77,7 +71,7 @@ PFL_NOINLINE static void move_state(pfl_t *f, uint32_t d, uint32_t first, uint32
     }
 }
 
-void pfl_kernel_move(pfl_t *f)
+void pfl_kernel_spread(pfl_t *f, float pull, void (*shape)(pfl_t *f, uint32_t n))
 {
     const uint32_t count = f->config->particles;
     pfl_cloud_moments(f, f->kernel_mean, f->kernel_cov);
@@ -88,11 +82,20 @@ void pfl_kernel_move(pfl_t *f)
     for (uint32_t first = 0u; first < count; first += PFL_BATCH) {
         const uint32_t n = ((count - first) < PFL_BATCH) ? (count - first) : PFL_BATCH;
         pfl_make_noise(f, f->config->states, n);
+        if (shape != NULL) {
+            shape(f, n);
+        }
         for (uint32_t d = 0u; d < f->config->states; d++) {
-            if (takes_part(f, d)) {
-                move_state(f, d, first, n);
+            if (pfl_kernel_takes(f, d)) {
+                move_state(f, d, first, n, pull);
             }
         }
         pfl_clip_to_box(f, first, n);
     }
+}
+
+void pfl_kernel_move(pfl_t *f)
+{
+    const float width = f->config->kernel->width;
+    pfl_kernel_spread(f, 1.0f - pfl_sqrt_kernel(1.0f - (width * width)), NULL);
 }

@@ -4,9 +4,6 @@
 
 #include <limits.h>
 
-/* A little more than PFL_LOGLIK_MAX, which itself is legal: what remains of a legal log-likelihood is below zero. */
-#define LOGLIK_SHIFT 0.00097656262f
-
 /* The rest of a group weighs nothing. */
 static void pad(float *log_weight, uint32_t n)
 {
@@ -33,7 +30,7 @@ static inline int32_t weigh(const float *restrict old, float old_top, uint32_t n
     int32_t best = w->best_bits;
     int32_t top = INT32_MAX;
     for (uint32_t i = 0u; i < n; i++) {
-        const float y = ll[i] - LOGLIK_SHIFT;
+        const float y = ll[i] - PFL_LOGLIK_SHIFT;
         const float s = equal ? y : ((old[i] - old_top) + y);
         const int32_t y_bits = pfl_bits(y);
         const int32_t s_bits = pfl_bits(s);

@@ -5,6 +5,7 @@
 #include "pflight/antithetic.h"
 #include "pflight/clock.h"
 #include "pflight/constraints.h"
+#include "pflight/errors.h"
 #include "pflight/filter.h"
 #include "pflight/guidance.h"
 #include "pflight/health.h"
@@ -14,9 +15,11 @@
 #include "pflight/per_particle.h"
 #include "pflight/port.h"
 #include "pflight/proposal.h"
+#include "pflight/regularised.h"
 #include "pflight/rng.h"
 #include "pflight/sensors.h"
 #include "pflight/status.h"
+#include "pflight/tempered.h"
 #include "pflight/waypoints.h"
 
 #endif
