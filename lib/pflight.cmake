@@ -65,6 +65,8 @@ set(PFLIGHT_LIB_SOURCES
   proposal_linear.c
   marginal_shared.c
   marginal_each.c
+  sensor_terrain.c
+  model_dead_reckoning.c
 )
 list(TRANSFORM PFLIGHT_LIB_SOURCES PREPEND "${CMAKE_CURRENT_LIST_DIR}/src/")
 
@@ -88,6 +90,7 @@ set(PFLIGHT_LIB_HEADERS
   sensors.h
   status.h
   tempered.h
+  terrain.h
   waypoints.h
 )
 list(TRANSFORM PFLIGHT_LIB_HEADERS PREPEND "${PFLIGHT_INCLUDE_DIR}/pflight/")

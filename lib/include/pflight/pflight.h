@@ -20,6 +20,7 @@
 #include "pflight/sensors.h"
 #include "pflight/status.h"
 #include "pflight/tempered.h"
+#include "pflight/terrain.h"
 #include "pflight/waypoints.h"
 
 #endif
