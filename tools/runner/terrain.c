@@ -13,9 +13,11 @@ static const setting_t settings[] = {
     {"power", "spread|full", 0.0, 0.0, "spread",
      "of the likelihood: less while the cloud is wide; plain always takes it whole"},
     {"scale", NULL, 1.0, 10000.0, "30", "power=spread: deviation of the cloud at which half of it is used [m]"},
-    {"least", NULL, 0.0, 1.0, "0.025", "power=spread: never less"},
+    {"least", NULL, 0.0, 1.0, "0.02", "power=spread: never less, at first"},
+    {"rise", NULL, 1.0, 100000.0, "200", "power=spread: `least` grows by itself in this time [s]"},
     {"most", NULL, 0.01, 1.0, "0.7", "power=spread: never more"},
-    {"kernel", NULL, 0.01, 0.99, "0.3", "width of the kernel step after resampling; plain has none"},
+    {"kernel", NULL, 0.01, 0.99, "0.35", "width of the kernel step after resampling; plain has none"},
+    {"shape", "shrinking|gaussian|epanechnikov", 0.0, 0.0, "shrinking", "of that step"},
 };
 
 static const char *const columns[] = {"measured_t_s", "error_m", "sigma_m", "baro_m"};
@@ -44,7 +46,9 @@ static bool open_study(const study_t *study, plan_t *plan, failure_t *failure)
     s->filter = filter_of(study->filter);
     s->second = study_is(study, "flight", "2");
     s->kernel_width = (float)study_number(study, "kernel");
+    s->kernel_shape = (terrain_shape_t)study_choice(study, "shape");
     s->power_least = (float)study_number(study, "least");
+    s->power_rise_s = (float)study_number(study, "rise");
     s->power_most = (float)study_number(study, "most");
     if (s->filter != TERRAIN_PLAIN && study_is(study, "power", "spread")) {
         s->power_scale_m = (float)study_number(study, "scale");

@@ -11,6 +11,8 @@
 
 typedef enum { TERRAIN_RB, TERRAIN_PLAIN, TERRAIN_REGULARISED, TERRAIN_TEMPERED } terrain_filter_t;
 
+typedef enum { TERRAIN_SHRINKING, TERRAIN_GAUSSIAN, TERRAIN_EPANECHNIKOV } terrain_shape_t;
+
 /* A row of the flight. */
 typedef struct {
     double t_s;
@@ -25,9 +27,11 @@ typedef struct {
     terrain_filter_t filter;
     bool second;       /* flight 2 */
     bool as_they_come; /* every setting but flight is as by default: the acceptance holds */
+    terrain_shape_t kernel_shape;
     float kernel_width;
     float power_scale_m; /* of pfl_terrain_power; 0: the whole likelihood from the start */
     float power_least;
+    float power_rise_s; /* after which `least` is twice as large, and so on */
     float power_most;
     pfl_grid_t grid;
     int16_t *height_m;

@@ -103,7 +103,8 @@ static pfl_terrain_z_t measured(const terrain_study_t *s, const terrain_row_t *r
     pfl_terrain_z_t z = {row->altitude_m, row->agl_m, pfl_sqrtf(variance), 1.0f};
 
     if (s->power_scale_m > 0.0f) {
-        z.power = s->power_most * pfl_terrain_power(spread_m, s->power_scale_m, s->power_least / s->power_most);
+        const float least = s->power_least * (1.0f + (float)row->t_s / s->power_rise_s);
+        z.power = s->power_most * pfl_terrain_power(spread_m, s->power_scale_m, least / s->power_most);
     }
     return z;
 }
@@ -186,10 +187,11 @@ bool terrain_fly(const terrain_study_t *s, uint32_t run, terrain_estimate_t *est
     const bool steps = s->filter == TERRAIN_TEMPERED;
     const pfl_sensor_t sensor = {.loglik = steps ? pfl_tempered_loglik : pfl_terrain_loglik,
                                  .user = steps ? (void *)&tempered : (void *)&radar};
+    static void (*const move[])(pfl_t *) = {pfl_kernel_move, pfl_kernel_gaussian, pfl_kernel_epanechnikov};
     const pfl_kernel_t kernel = {
         .width = s->kernel_width,
         .states_mask = s->filter == TERRAIN_RB ? 7u : 31u,
-        .move = pfl_kernel_move,
+        .move = move[s->kernel_shape],
     };
     model_t model = make_model(s);
     model.shared.model.user = &model.motion;
