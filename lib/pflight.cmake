@@ -69,6 +69,10 @@ set(PFLIGHT_LIB_SOURCES
   guidance_waypoint.c
   antithetic.c
   proposal_linear.c
+  marginal_shared.c
+  marginal_each.c
+  sensor_terrain.c
+  model_dead_reckoning.c
 )
 list(TRANSFORM PFLIGHT_LIB_SOURCES PREPEND "${CMAKE_CURRENT_LIST_DIR}/src/")
 
@@ -84,6 +88,7 @@ set(PFLIGHT_LIB_HEADERS
   guidance.h
   health.h
   jump.h
+  marginal.h
   math.h
   models.h
   per_particle.h
@@ -94,6 +99,7 @@ set(PFLIGHT_LIB_HEADERS
   sensors.h
   status.h
   tempered.h
+  terrain.h
   waypoints.h
 )
 list(TRANSFORM PFLIGHT_LIB_HEADERS PREPEND "${PFLIGHT_INCLUDE_DIR}/pflight/")

@@ -43,16 +43,22 @@ static bool next_line(reader_t *r, FILE *file, failure_t *failure)
     return true;
 }
 
+/* The name in the header; that of a column that may be empty is written after a '?'. */
+static const char *name_of(const char *column)
+{
+    return column[0] == '?' ? column + 1 : column;
+}
+
 static bool find_columns(const reader_t *r, const char *const *column, size_t columns, size_t *where,
                          failure_t *failure)
 {
     for (size_t c = 0u; c < columns; c++) {
         where[c] = FIELDS_MAX;
         for (size_t k = 0u; k < r->fields; k++) {
-            where[c] = strcmp(r->field[k], column[c]) == 0 ? k : where[c];
+            where[c] = strcmp(r->field[k], name_of(column[c])) == 0 ? k : where[c];
         }
         if (where[c] == FIELDS_MAX) {
-            return fail(failure, EXIT_HARNESS, "%s, line 1: no column '%s' in the header", r->path, column[c]);
+            return fail(failure, EXIT_HARNESS, "%s, line 1: no column '%s' in the header", r->path, name_of(column[c]));
         }
     }
     return true;
@@ -62,14 +68,18 @@ static bool read_number(const reader_t *r, size_t where, const char *name, doubl
 {
     if (where >= r->fields) {
         return fail(failure, EXIT_HARNESS, "%s, line %zu: column %zu (%s) is missing: expected a number", r->path,
-                    r->line_number, where + 1u, name);
+                    r->line_number, where + 1u, name_of(name));
     }
     char *end = r->field[where];
+    if (name[0] == '?' && *end == '\0') {
+        *number = (double)NAN;
+        return true;
+    }
     errno = 0;
     *number = strtod(r->field[where], &end);
     if (end == r->field[where] || *end != '\0' || !(fabs(*number) <= NUMBER_MAX)) {
         return fail(failure, EXIT_HARNESS, "%s, line %zu: column %zu (%s) is '%s': expected a number of at most %g",
-                    r->path, r->line_number, where + 1u, name, r->field[where], NUMBER_MAX);
+                    r->path, r->line_number, where + 1u, name_of(name), r->field[where], NUMBER_MAX);
     }
     return true;
 }

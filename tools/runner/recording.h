@@ -7,7 +7,7 @@
 
 #include <stddef.h>
 
-#define RECORDING_COLUMNS_MAX 8
+#define RECORDING_COLUMNS_MAX 12
 
 /* Row i, requested column c is value[i * columns + c]. Zero it before use. */
 typedef struct {
@@ -18,7 +18,7 @@ typedef struct {
 
 /* Reads the named columns of folder/name. The first of them must not decrease where it is called "t_s". At least one
  * row. False with the failure filled in, and nothing to free, otherwise; a file that is not there is marked as a
- * missing recording. */
+ * missing recording. A name after a '?' is one of a column that may be empty: NaN there. */
 bool recording_read(recording_t *recording, const char *folder, const char *name, const char *const *column,
                     size_t columns, failure_t *failure);
 void recording_free(recording_t *recording);

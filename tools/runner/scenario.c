@@ -4,6 +4,7 @@
 #include "gps.h"
 #include "land_vehicle.h"
 #include "standoff.h"
+#include "terrain.h"
 #include "uav_trajectory.h"
 #include "uwb_range.h"
 
@@ -12,8 +13,8 @@
 #include <stdlib.h>
 #include <string.h>
 
-const scenario_t *const all_scenarios[] = {&land_vehicle_scenario, &uwb_range_scenario, &standoff_scenario,
-                                           &uav_trajectory_scenario, &gps_scenario};
+const scenario_t *const all_scenarios[] = {&land_vehicle_scenario,   &uwb_range_scenario, &standoff_scenario,
+                                           &uav_trajectory_scenario, &gps_scenario,       &terrain_scenario};
 const size_t all_scenarios_count = sizeof all_scenarios / sizeof all_scenarios[0];
 
 const scenario_t *scenario_find(const char *name)

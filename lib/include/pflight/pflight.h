@@ -12,6 +12,7 @@
 #include "pflight/guidance.h"
 #include "pflight/health.h"
 #include "pflight/jump.h"
+#include "pflight/marginal.h"
 #include "pflight/math.h"
 #include "pflight/models.h"
 #include "pflight/per_particle.h"
@@ -22,6 +23,7 @@
 #include "pflight/sensors.h"
 #include "pflight/status.h"
 #include "pflight/tempered.h"
+#include "pflight/terrain.h"
 #include "pflight/waypoints.h"
 
 #endif
