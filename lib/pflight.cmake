@@ -58,6 +58,7 @@ set(PFLIGHT_LIB_SOURCES
   guidance_waypoint.c
   antithetic.c
   proposal_linear.c
+  wind.c
 )
 list(TRANSFORM PFLIGHT_LIB_SOURCES PREPEND "${CMAKE_CURRENT_LIST_DIR}/src/")
 
@@ -78,6 +79,7 @@ set(PFLIGHT_LIB_HEADERS
   sensors.h
   status.h
   waypoints.h
+  wind.h
 )
 list(TRANSFORM PFLIGHT_LIB_HEADERS PREPEND "${PFLIGHT_INCLUDE_DIR}/pflight/")
 

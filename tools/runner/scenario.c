@@ -6,14 +6,15 @@
 #include "standoff.h"
 #include "uav_trajectory.h"
 #include "uwb_range.h"
+#include "wind.h"
 
 #include <ctype.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
 
-const scenario_t *const all_scenarios[] = {&land_vehicle_scenario, &uwb_range_scenario, &standoff_scenario,
-                                           &uav_trajectory_scenario, &gps_scenario};
+const scenario_t *const all_scenarios[] = {&land_vehicle_scenario,   &uwb_range_scenario, &standoff_scenario,
+                                           &uav_trajectory_scenario, &gps_scenario,       &wind_scenario};
 const size_t all_scenarios_count = sizeof all_scenarios / sizeof all_scenarios[0];
 
 const scenario_t *scenario_find(const char *name)

@@ -17,5 +17,6 @@
 #include "pflight/sensors.h"
 #include "pflight/status.h"
 #include "pflight/waypoints.h"
+#include "pflight/wind.h"
 
 #endif
