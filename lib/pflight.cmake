@@ -59,6 +59,8 @@ set(PFLIGHT_LIB_SOURCES
   antithetic.c
   proposal_linear.c
   wind.c
+  model_hover.c
+  sensor_biased.c
 )
 list(TRANSFORM PFLIGHT_LIB_SOURCES PREPEND "${CMAKE_CURRENT_LIST_DIR}/src/")
 

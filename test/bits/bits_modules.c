@@ -250,6 +250,15 @@ static void of_wind(void)
     of_sensor("sensor-wind", pfl_wind_loglik, &wind, &fix);
 }
 
+static void of_hover(void)
+{
+    static pfl_hover_t hover = {3u, 1u, 2.0f, {3.0f, 2.0f, 1.0f}, {0.1f}};
+    static pfl_biased_t biased = {3u, {0u, 2u, 5u}, {PFL_UNBIASED, 6u, PFL_UNBIASED}, {0.5f, 2.0f, 1.0f}};
+    static const float seen[3] = {1.2f, -0.4f, 0.3f};
+    of_model("model-hover", pfl_hover_predict, &hover, NULL, 0.0f, 3.0f);
+    of_sensor("sensor-biased", pfl_biased_loglik, &biased, seen);
+}
+
 void of_modules(void)
 {
     of_models();
@@ -259,4 +268,5 @@ void of_modules(void)
     of_predictive_control();
     of_waypoints();
     of_wind();
+    of_hover();
 }

@@ -2,6 +2,7 @@
 #include "scenario.h"
 
 #include "gps.h"
+#include "gps_fault.h"
 #include "land_vehicle.h"
 #include "standoff.h"
 #include "uav_trajectory.h"
@@ -14,7 +15,8 @@
 #include <string.h>
 
 const scenario_t *const all_scenarios[] = {&land_vehicle_scenario,   &uwb_range_scenario, &standoff_scenario,
-                                           &uav_trajectory_scenario, &gps_scenario,       &wind_scenario};
+                                           &uav_trajectory_scenario, &gps_scenario,       &wind_scenario,
+                                           &gps_fault_scenario};
 const size_t all_scenarios_count = sizeof all_scenarios / sizeof all_scenarios[0];
 
 const scenario_t *scenario_find(const char *name)
