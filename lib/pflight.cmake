@@ -73,6 +73,9 @@ set(PFLIGHT_LIB_SOURCES
   marginal_each.c
   sensor_terrain.c
   model_dead_reckoning.c
+  wind.c
+  model_hover.c
+  sensor_biased.c
 )
 list(TRANSFORM PFLIGHT_LIB_SOURCES PREPEND "${CMAKE_CURRENT_LIST_DIR}/src/")
 
@@ -101,6 +104,7 @@ set(PFLIGHT_LIB_HEADERS
   tempered.h
   terrain.h
   waypoints.h
+  wind.h
 )
 list(TRANSFORM PFLIGHT_LIB_HEADERS PREPEND "${PFLIGHT_INCLUDE_DIR}/pflight/")
 

@@ -219,6 +219,46 @@ static void of_waypoints(void)
     end("waypoints");
 }
 
+static void of_wind(void)
+{
+    static pfl_wind_t wind = {.wind_walk = 0.03f,
+                              .gust_sigma_mps = 1.0f,
+                              .gust_time_s = 10.0f,
+                              .scale_walk = 0.002f,
+                              .offset_sigma_rad = 0.1f,
+                              .offset_time_s = 30.0f,
+                              .sigma_position_m = 3.0f,
+                              .sigma_velocity_mps = 2.5f,
+                              .dof = 4.0f,
+                              .start_wind_mps = 6.0f};
+    static const pfl_wind_fix_t fix = {2.0f, -1.0f, 14.0f, 3.0f, 15.0f, 0.4f, 1.3f};
+    static const pfl_wind_input_t input = {&fix, 15.0f, 0.4f};
+    float mean[PFL_WIND_STATES] = {1.0f, 0.5f, -0.2f, -2.0f, 1.5f, 0.1f, 1.02f, 0.05f};
+    begin(77u);
+    pfl_wind_start(&wind);
+    for (uint32_t k = 0u; k < 50u; k++) {
+        pfl_wind_move(&wind, 0.2f);
+        pfl_wind_weigh(&wind, mean, &fix);
+        pfl_wind_fuse(&wind, mean, &fix);
+        for (uint32_t j = 0u; j < PFL_WIND_COV; j++) {
+            mix(wind.cov[j]);
+            mix(mean[j]);
+        }
+    }
+    end("wind");
+    of_model("model-wind", pfl_wind_predict, &wind, &input, 1.0f, 2.0f);
+    of_sensor("sensor-wind", pfl_wind_loglik, &wind, &fix);
+}
+
+static void of_hover(void)
+{
+    static pfl_hover_t hover = {3u, 1u, 2.0f, {3.0f, 2.0f, 1.0f}, {0.1f}};
+    static pfl_biased_t biased = {3u, {0u, 2u, 5u}, {PFL_UNBIASED, 6u, PFL_UNBIASED}, {0.5f, 2.0f, 1.0f}};
+    static const float seen[3] = {1.2f, -0.4f, 0.3f};
+    of_model("model-hover", pfl_hover_predict, &hover, NULL, 0.0f, 3.0f);
+    of_sensor("sensor-biased", pfl_biased_loglik, &biased, seen);
+}
+
 void of_modules(void)
 {
     of_models();
@@ -227,4 +267,6 @@ void of_modules(void)
     of_field();
     of_predictive_control();
     of_waypoints();
+    of_wind();
+    of_hover();
 }

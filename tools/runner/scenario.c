@@ -2,11 +2,13 @@
 #include "scenario.h"
 
 #include "gps.h"
+#include "gps_fault.h"
 #include "land_vehicle.h"
 #include "standoff.h"
 #include "terrain.h"
 #include "uav_trajectory.h"
 #include "uwb_range.h"
+#include "wind.h"
 
 #include <ctype.h>
 #include <stdio.h>
@@ -14,7 +16,8 @@
 #include <string.h>
 
 const scenario_t *const all_scenarios[] = {&land_vehicle_scenario,   &uwb_range_scenario, &standoff_scenario,
-                                           &uav_trajectory_scenario, &gps_scenario,       &terrain_scenario};
+                                           &uav_trajectory_scenario, &gps_scenario,       &wind_scenario,
+                                           &gps_fault_scenario,      &terrain_scenario};
 const size_t all_scenarios_count = sizeof all_scenarios / sizeof all_scenarios[0];
 
 const scenario_t *scenario_find(const char *name)

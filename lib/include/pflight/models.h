@@ -221,6 +221,25 @@ typedef struct {
 
 void pfl_turn_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p);
 
+/* ---- A vehicle that hovers or wanders on 1 .. 3 axes ---------------------------------------------------------------- */
+/* With A axes and B biases: states 0 .. A-1 are positions [m], A .. 2A-1 velocities [m/s], 2A .. 2A+B-1 biases, of a
+ * barometer against GPS say. The velocities are coloured noise of first order and come back to zero, so that the
+ * uncertainty without measurements grows as the root of time, not as its power of 3/2:
+ *     v <- k v + sqrt(1 - k^2) sigma w, k = exp(-dt/time)      p += dt (v_old + v) / 2      b += bias_walk sqrt(dt) w
+ * Q = A + B. u: not used. */
+#define PFL_HOVER_AXES_MAX 3u
+#define PFL_HOVER_BIASES_MAX 4u
+
+typedef struct {
+    uint16_t axes;                         /* 1 .. PFL_HOVER_AXES_MAX */
+    uint16_t biases;                       /* 0 .. PFL_HOVER_BIASES_MAX */
+    float time_s;                          /* correlation time of the velocities, > 0 */
+    float sigma_mps[PFL_HOVER_AXES_MAX];   /* of each of them */
+    float bias_walk[PFL_HOVER_BIASES_MAX]; /* [unit/sqrt(s)] */
+} pfl_hover_t;
+
+void pfl_hover_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p);
+
 #ifdef __cplusplus
 }
 #endif

@@ -25,5 +25,6 @@
 #include "pflight/tempered.h"
 #include "pflight/terrain.h"
 #include "pflight/waypoints.h"
+#include "pflight/wind.h"
 
 #endif

@@ -92,6 +92,20 @@ typedef struct {
 /* z: float[2], along x and y. ll = -1/2 |(v cos psi, v sin psi) - z|^2 / sigma^2. */
 void pfl_velocity_loglik(void *user, const void *z, const pfl_view_t *p, float *ll);
 
+/* ---- States seen directly, some through a bias that the filter estimates ------------------------------------------ */
+#define PFL_BIASED_MAX 6u
+#define PFL_UNBIASED 0xFFFFu
+
+typedef struct {
+    uint16_t count;                  /* components, 1 .. PFL_BIASED_MAX */
+    uint16_t state[PFL_BIASED_MAX];  /* index of the state that component k measures */
+    uint16_t bias[PFL_BIASED_MAX];   /* index of the state that adds to it; PFL_UNBIASED: none */
+    float inv_sigma[PFL_BIASED_MAX]; /* 1 / standard deviation of component k */
+} pfl_biased_t;
+
+/* z: float[count]. ll = -1/2 sum ((x + b - z) / sigma)^2. */
+void pfl_biased_loglik(void *user, const void *z, const pfl_view_t *p, float *ll);
+
 #ifdef __cplusplus
 }
 #endif
