@@ -186,7 +186,10 @@ typedef struct {
 void pfl_weigh_start(pfl_weigh_t *w, bool gated);
 void pfl_weigh_batch(const pfl_t *f, uint32_t first, uint32_t n, const float *ll, pfl_weigh_t *w); /* into scratch */
 void pfl_weights_equal(pfl_t *f);
-void pfl_weights_settle(pfl_t *f); /* before the column of log-weights is read or changed: it holds them from now on */
+/* Before the column of log-weights is read or changed: it holds them from now on. */
+/*@ requires sized(f) && column(f->log_weight, f) && \valid(f);
+    assigns f->log_weight[0 .. f->stride - 1], f->weights_equal; */
+void pfl_weights_settle(pfl_t *f);
 void pfl_weights_after_loss(pfl_t *f); /* some particles lost theirs: a new top, or equal ones if none is left */
 
 /* moments.c */

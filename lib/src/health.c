@@ -90,7 +90,7 @@ pfl_status_t pfl_record(const pfl_t *f, pfl_record_t *out)
     out->event = (uint16_t)f->watched.event;
     out->reject = (uint16_t)(f->watched.reject & 0xFFFFu);
     out->state = (uint8_t)((f->watched.phase & 0xFu) | ((mode_of(f) & 0xFu) << 4));
-    const uint32_t whole = (ratio < 255.0f) ? (uint32_t)ratio : 255u;
+    const uint32_t whole = ((ratio >= 0.0f) && (ratio < 255.0f)) ? (uint32_t)ratio : 255u;
     out->ratio = (uint8_t)whole;
     return PFL_OK;
 }

@@ -45,6 +45,8 @@ static inline uint32_t pfl_xoshiro_next_upper(uint32_t s[4])
 }
 
 /* False when a stream sits in the all-zero state, from which it would never come back. */
+/*@ requires \valid_read(rng);
+    assigns \nothing; */
 bool pfl_rng_alive(const pfl_rng_t *rng);
 
 #endif

@@ -13,17 +13,37 @@
 #define TRACK_WORDS ((size_t)6)
 #define RNG_WORDS ((4u * PFL_RNG_LANES) + 4u)
 
+/* For the proofs: a word as it stands in a snapshot, the shape of a filter, and the words of its snapshot. */
+/*@ logic integer word_of{L}(unsigned char *p) = p[0] + 0x100 * p[1] + 0x10000 * p[2] + 0x1000000 * p[3];
+    predicate shaped{L}(pfl_t *f) =
+      sized(f) && 1 <= f->config->states <= PFL_STATES_MAX && f->config->sensor_count <= PFL_SENSORS_MAX &&
+      (f->sensor != \null ==> \valid(f->sensor + (0 .. f->config->sensor_count - 1)));
+    logic integer tracks_of{L}(pfl_t *f) = f->sensor != \null ? f->config->sensor_count : 0;
+    logic integer moments_of(integer d) = 4 * d + (d * (d + 1)) / 2;
+    logic integer words(integer n, integer d, integer t) =
+      HEAD_WORDS + TRACK_WORDS * t + RNG_WORDS + moments_of(d) + n * (d + 1) + 1; */
+
 /* From `mean` on: mean, best, centre, delta and covariance lie end to end (pfl_lay_out). */
+/*@ requires states <= PFL_STATES_MAX;
+    assigns \nothing;
+    ensures \result == moments_of(states) && \result <= 200; */
 static size_t moment_words(size_t states)
 {
     return (4u * states) + ((states * (states + 1u)) / 2u);
 }
 
+/*@ requires shaped(f);
+    assigns \nothing;
+    ensures \result == tracks_of(f) && \result <= PFL_SENSORS_MAX;
+    ensures 0 < \result ==> \valid(f->sensor + (0 .. \result - 1)); */
 static size_t tracked(const pfl_t *f)
 {
     return (f->sensor != NULL) ? f->config->sensor_count : 0u;
 }
 
+/*@ requires shaped(f);
+    assigns \nothing;
+    ensures \result == words(f->config->particles, f->config->states, tracks_of(f)); */
 static size_t total_words(const pfl_t *f)
 {
     const size_t states = f->config->states;
@@ -31,6 +51,8 @@ static size_t total_words(const pfl_t *f)
            ((size_t)f->config->particles * (states + 1u)) + 1u;
 }
 
+/*@ requires \valid(at + (0 .. 3));
+    assigns at[0 .. 3]; */
 static void put_word(unsigned char *at, uint32_t word)
 {
     at[0] = (unsigned char)(word & 0xFFu);
@@ -39,17 +61,28 @@ static void put_word(unsigned char *at, uint32_t word)
     at[3] = (unsigned char)(word >> 24);
 }
 
+/*@ requires \valid_read(at + (0 .. 3));
+    assigns \nothing;
+    ensures \result == word_of(at); */
 static uint32_t get_word(const unsigned char *at)
 {
-    return (uint32_t)at[0] | ((uint32_t)at[1] << 8) | ((uint32_t)at[2] << 16) | ((uint32_t)at[3] << 24);
+    return (uint32_t)at[0] + ((uint32_t)at[1] * 0x100u) + ((uint32_t)at[2] * 0x10000u) + ((uint32_t)at[3] * 0x1000000u);
 }
 
 /* CRC-32 (reflected 0xEDB88320), bit by bit: no table to keep. */
+/*@ requires \valid_read(bytes + (0 .. n - 1));
+    assigns \nothing; */
 static uint32_t crc32(const unsigned char *bytes, size_t n)
 {
     uint32_t crc = 0xFFFFFFFFu;
+    /*@ loop invariant i <= n;
+        loop assigns i, crc;
+        loop variant n - i; */
     for (size_t i = 0u; i < n; i++) {
         crc ^= bytes[i];
+        /*@ loop invariant bit <= 8;
+            loop assigns bit, crc;
+            loop variant 8 - bit; */
         for (uint32_t bit = 0u; bit < 8u; bit++) {
             crc = (crc >> 1) ^ (0xEDB88320u & (0u - (crc & 1u)));
         }
@@ -57,8 +90,14 @@ static uint32_t crc32(const unsigned char *bytes, size_t n)
     return ~crc;
 }
 
+/*@ requires n <= PFL_PARTICLES_MAX && \valid(at + (0 .. (4 * n) - 1)) && \valid_read(x + (0 .. n - 1));
+    assigns at[0 .. (4 * n) - 1];
+    ensures \result == at + 4 * n; */
 static unsigned char *put_floats(unsigned char *at, const float *x, size_t n)
 {
+    /*@ loop invariant i <= n && at == \at(at, Pre) + 4 * i;
+        loop assigns i, at, \at(at, Pre)[0 .. (4 * n) - 1];
+        loop variant n - i; */
     for (size_t i = 0u; i < n; i++) {
         put_word(at, pfl_load_u32(&x[i]));
         at += 4;
@@ -66,8 +105,14 @@ static unsigned char *put_floats(unsigned char *at, const float *x, size_t n)
     return at;
 }
 
+/*@ requires n <= PFL_PARTICLES_MAX && \valid_read(at + (0 .. (4 * n) - 1)) && \valid(x + (0 .. n - 1));
+    assigns x[0 .. n - 1];
+    ensures \result == at + 4 * n; */
 static const unsigned char *get_floats(const unsigned char *at, float *x, size_t n)
 {
+    /*@ loop invariant i <= n && at == \at(at, Pre) + 4 * i;
+        loop assigns i, at, x[0 .. n - 1];
+        loop variant n - i; */
     for (size_t i = 0u; i < n; i++) {
         pfl_store_u32(&x[i], get_word(at));
         at += 4;
@@ -76,27 +121,43 @@ static const unsigned char *get_floats(const unsigned char *at, float *x, size_t
 }
 
 /* Word k of what begins at `at`. */
+/*@ requires k <= 0x10000000 && \valid_read(at + (4 * k .. (4 * k) + 3));
+    assigns \nothing;
+    ensures \result == word_of(at + 4 * k); */
 static uint32_t word_at(const unsigned char *at, size_t k)
 {
     return get_word(&at[4u * k]);
 }
 
+/*@ requires k <= 0x10000000 && \valid_read(at + (4 * k .. (4 * k) + 3));
+    assigns \nothing; */
 static float float_at(const unsigned char *at, size_t k)
 {
     return pfl_from_bits((int32_t)word_at(at, k));
 }
 
+/*@ requires k < 0x10000000 && \valid_read(at + (4 * k .. (4 * k) + 7));
+    assigns \nothing; */
 static uint64_t time_at(const unsigned char *at, size_t k)
 {
     return (uint64_t)word_at(at, k) | ((uint64_t)word_at(at, k + 1u) << 32);
 }
 
+/*@ requires \valid(rng) && \valid_read(at + (0 .. (4 * RNG_WORDS) - 1));
+    assigns *rng;
+    ensures \result == at + 4 * RNG_WORDS; */
 static const unsigned char *get_streams(const unsigned char *at, pfl_rng_t *rng)
 {
+    /*@ loop invariant k <= 4 * PFL_RNG_LANES && at == \at(at, Pre) + 4 * k;
+        loop assigns k, at, rng->s[0 .. 3][0 .. PFL_RNG_LANES - 1];
+        loop variant 4 * PFL_RNG_LANES - k; */
     for (uint32_t k = 0u; k < (4u * PFL_RNG_LANES); k++) {
         rng->s[k / PFL_RNG_LANES][k % PFL_RNG_LANES] = get_word(at);
         at += 4;
     }
+    /*@ loop invariant k <= 4 && at == \at(at, Pre) + 4 * (4 * PFL_RNG_LANES + k);
+        loop assigns k, at, rng->one[0 .. 3];
+        loop variant 4 - k; */
     for (uint32_t k = 0u; k < 4u; k++) {
         rng->one[k] = get_word(at);
         at += 4;
@@ -178,7 +239,7 @@ pfl_status_t pfl_snapshot(const pfl_t *f, void *buffer, size_t buffer_bytes)
     if (entered != PFL_OK) {
         return entered;
     }
-    const size_t bytes = pfl_snapshot_bytes(f);
+    const size_t bytes = 4u * total_words(f);
     if (buffer == NULL) {
         return PFL_ERR_ARG;
     }
@@ -213,6 +274,8 @@ pfl_status_t pfl_snapshot(const pfl_t *f, void *buffer, size_t buffer_bytes)
 
 /* ---- Restore -------------------------------------------------------------------------------------------------- */
 
+/*@ requires shaped(f) && \valid_read(at + (0 .. (4 * HEAD_WORDS) - 1));
+    assigns \nothing; */
 static bool shape_fits(const pfl_t *f, const unsigned char *at)
 {
     return (word_at(at, 0) == SNAPSHOT_MAGIC) && (word_at(at, 1) == SNAPSHOT_VERSION) &&
@@ -220,36 +283,57 @@ static bool shape_fits(const pfl_t *f, const unsigned char *at)
            (word_at(at, 4) == f->config->noises) && (word_at(at, 24) == f->config->moments);
 }
 
+/*@ assigns \nothing; */
+static bool is_ratio(float x)
+{
+    return pfl_is_finite(x) && (x >= 0.0f);
+}
+
+/*@ requires shaped(f) && \valid_read(at + (0 .. (4 * HEAD_WORDS) - 1));
+    assigns \nothing;
+    ensures \result ==> word_of(at + 4 * 27) < f->config->particles; */
 static bool numbers_fit(const pfl_t *f, const unsigned char *at)
 {
     const float sum = float_at(at, 12);
     const float ess = float_at(at, 14);
-    return pfl_is_finite(float_at(at, 11)) && pfl_is_finite(sum) && (sum > 0.0f) && pfl_is_finite(float_at(at, 13)) &&
+    return pfl_is_finite(float_at(at, 11)) && pfl_is_finite(sum) && (sum > 0.0f) && is_ratio(float_at(at, 13)) &&
            (ess >= 1.0f) && (ess <= (float)f->config->particles) && (word_at(at, 15) <= MOMENTS_OVERFLOWED) &&
            (word_at(at, 16) <= 1u) && (word_at(at, 27) < f->config->particles);
 }
 
+/*@ requires shaped(f) && \valid_read(at + (0 .. (4 * HEAD_WORDS) - 1));
+    assigns \nothing; */
 static bool watch_fits(const pfl_t *f, const unsigned char *at)
 {
     const uint32_t sensors = f->config->sensor_count;
     const bool known =
         (sensors == 32u) || ((word_at(at, 34) >> sensors) == 0u); /* whose last measurement was refused */
     return known && (word_at(at, 29) == tracked(f)) && (word_at(at, 32) <= (uint32_t)PFL_PHASE_SETTLING) &&
-           pfl_is_finite(float_at(at, 41)) && pfl_is_finite(float_at(at, 42));
+           pfl_is_finite(float_at(at, 41)) && is_ratio(float_at(at, 42));
 }
 
+/*@ requires shaped(f) && \valid_read(at + (0 .. (4 * TRACK_WORDS * tracks_of(f)) - 1));
+    assigns \nothing; */
 static bool tracks_are_good(const pfl_t *f, const unsigned char *at)
 {
+    /*@ loop invariant k <= tracks_of(f);
+        loop assigns k;
+        loop variant tracks_of(f) - k; */
     for (size_t k = 0u; k < tracked(f); k++) {
-        if (!pfl_is_finite(float_at(at, (k * TRACK_WORDS) + 2u))) {
+        if (!is_ratio(float_at(at, (k * TRACK_WORDS) + 2u))) {
             return false;
         }
     }
     return true;
 }
 
+/*@ requires n <= 0x10000000 && \valid_read(at + (0 .. (4 * n) - 1));
+    assigns \nothing; */
 static bool floats_are_finite(const unsigned char *at, size_t n)
 {
+    /*@ loop invariant k <= n;
+        loop assigns k;
+        loop variant n - k; */
     for (size_t k = 0u; k < n; k++) {
         if (!pfl_is_finite(float_at(at, k))) {
             return false;
@@ -259,9 +343,14 @@ static bool floats_are_finite(const unsigned char *at, size_t n)
 }
 
 /* None above their top, and one that reaches it: without it all weights could be zero, and so could their sum. */
+/*@ requires n <= PFL_PARTICLES_MAX && \valid_read(at + (0 .. (4 * n) - 1));
+    assigns \nothing; */
 static bool log_weights_fit(const unsigned char *at, uint32_t n, float top)
 {
     bool reached = false;
+    /*@ loop invariant i <= n;
+        loop assigns i, reached;
+        loop variant n - i; */
     for (size_t i = 0u; i < n; i++) {
         const float relative = float_at(at, i) - top;
         if (!(relative <= 0.0f)) {
@@ -272,6 +361,9 @@ static bool log_weights_fit(const unsigned char *at, uint32_t n, float top)
     return reached;
 }
 
+/*@ requires shaped(f);
+    requires \valid_read(at + (0 .. (4 * words(f->config->particles, f->config->states, tracks_of(f))) - 1));
+    assigns \nothing; */
 static bool body_is_good(const pfl_t *f, const unsigned char *at)
 {
     const size_t states = f->config->states;
@@ -283,6 +375,11 @@ static bool body_is_good(const pfl_t *f, const unsigned char *at)
            log_weights_fit(floats + (4u * finite), f->config->particles, float_at(at, 11));
 }
 
+/*@ requires \valid(f) && \valid_read(at + (0 .. (4 * HEAD_WORDS) - 1));
+    assigns f->t_us, f->reset_t_us, f->t_fused_us, f->log_weight_top, f->weight_sum, f->test_ratio, f->ess,
+            f->moments_current, f->resample_pending, f->fused, f->rejected, f->faulted, f->resampled, f->quarantined,
+            f->resets, f->overruns, f->redrawn, f->projected, f->best_index, f->mended, f->watched, f->scratch_is_weights;
+    ensures f->best_index == \old(word_of(at + 4 * 27)); */
 static void take_head(pfl_t *f, const unsigned char *at)
 {
     f->t_us = time_at(at, 5);
@@ -320,10 +417,18 @@ static void take_head(pfl_t *f, const unsigned char *at)
     f->scratch_is_weights = 0u;
 }
 
-static const unsigned char *take_tracks(pfl_t *f, const unsigned char *at)
+/*@ requires shaped(f) && \valid_read(at + (0 .. (4 * TRACK_WORDS * tracks_of(f)) - 1));
+    assigns f->sensor[0 .. tracks_of(f) - 1];
+    ensures \result == at + 4 * TRACK_WORDS * \old(tracks_of(f)); */
+static const unsigned char *take_tracks(const pfl_t *f, const unsigned char *at)
 {
-    for (size_t k = 0u; k < tracked(f); k++) {
-        pfl_sensor_track_t *track = &f->sensor[k];
+    pfl_sensor_track_t *const tracks = f->sensor;
+    const size_t count = tracked(f);
+    /*@ loop invariant k <= count && at == \at(at, Pre) + 4 * TRACK_WORDS * k;
+        loop assigns k, at, tracks[0 .. count - 1];
+        loop variant count - k; */
+    for (size_t k = 0u; k < count; k++) {
+        pfl_sensor_track_t *track = &tracks[k];
         track->t_fused_us = time_at(at, 0);
         track->test_ratio = float_at(at, 2);
         track->refused = word_at(at, 3);
@@ -335,27 +440,55 @@ static const unsigned char *take_tracks(pfl_t *f, const unsigned char *at)
     return at;
 }
 
+/* A snapshot of this filter's shape, every word of it sane. */
+/*@ requires shaped(f) && bytes == 4 * words(f->config->particles, f->config->states, tracks_of(f));
+    requires \valid_read(at + (0 .. bytes - 1));
+    assigns \nothing;
+    ensures \result ==> word_of(at + 4 * 27) < f->config->particles; */
+static bool is_good(const pfl_t *f, const unsigned char *at, size_t bytes)
+{
+    return shape_fits(f, at) && numbers_fit(f, at) && watch_fits(f, at) &&
+           (get_word(at + (bytes - 4u)) == crc32(at, bytes - 4u)) && body_is_good(f, at);
+}
+
+/*@ requires shaped(f) && column(f->log_weight, f);
+    requires \valid_read(at + (0 .. (4 * (moments_of(f->config->states) +
+                                          f->config->particles * (f->config->states + 1))) - 1));
+    requires \valid(f->mean + (0 .. moments_of(f->config->states) - 1));
+    requires \valid(f->x + (0 .. (f->config->states * f->stride) - 1));
+    assigns f->mean[0 .. 199], f->x[0 .. (f->config->states * f->stride) - 1], f->log_weight[0 .. f->stride - 1]; */
+static void take_floats(const pfl_t *f, const unsigned char *at)
+{
+    const size_t states = f->config->states;
+    const uint32_t count = f->config->particles;
+    const unsigned char *next = get_floats(at, f->mean, moment_words(states));
+    /*@ loop invariant d <= states;
+        loop invariant next == at + 4 * moments_of(states) + 4 * (d * count);
+        loop assigns d, next, f->x[0 .. (states * f->stride) - 1];
+        loop variant states - d; */
+    for (size_t d = 0u; d < states; d++) {
+        /*@ assert fits(d, 1, states, f->stride); */
+        /*@ assert fits(d, 1, states, count); */
+        next = get_floats(next, &f->x[d * f->stride], count);
+    }
+    (void)get_floats(next, f->log_weight, count);
+}
+
 static pfl_status_t restore(pfl_t *f, const void *buffer, size_t buffer_bytes)
 {
     if (buffer == NULL) {
         return PFL_ERR_ARG;
     }
     const unsigned char *at = (const unsigned char *)buffer;
-    const size_t bytes = pfl_snapshot_bytes(f);
-    if ((buffer_bytes < bytes) || !shape_fits(f, at) || !numbers_fit(f, at) || !watch_fits(f, at) ||
-        (get_word(at + (bytes - 4u)) != crc32(at, bytes - 4u)) || !body_is_good(f, at)) {
+    const size_t bytes = 4u * total_words(f);
+    if ((buffer_bytes < bytes) || !is_good(f, at, bytes)) {
         return PFL_ERR_CORRUPT;
     }
-    const size_t states = f->config->states;
     take_head(f, at);
     at = take_tracks(f, at + (4u * HEAD_WORDS));
     at = get_streams(at, &f->rng);
-    at = get_floats(at, f->mean, moment_words(states));
-    for (size_t d = 0u; d < states; d++) {
-        at = get_floats(at, &f->x[d * f->stride], f->config->particles);
-    }
     pfl_weights_settle(f); /* the padding of the column, too */
-    (void)get_floats(at, f->log_weight, f->config->particles);
+    take_floats(f, at);
     return PFL_OK;
 }
 

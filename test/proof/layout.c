@@ -141,7 +141,7 @@ int main(void)
                 for (uint32_t k = 0u; k < 9u; k++) { /* 0 .. 2 tries; no watch, or one of one sensor or all */
                     const uint32_t tries = k % 3u;
                     const uint16_t watched = (uint16_t)((k < 6u) ? (k / 3u) : PFL_SENSORS_MAX);
-                    const pfl_constraint_t constraint = {inside, project, NULL, tries, keep};
+                    const pfl_constraint_t constraint = {inside, project, NULL, tries, 0u, keep};
                     const pfl_config_t c = {.abi = PFL_ABI,
                                             .particles = n,
                                             .states = d,

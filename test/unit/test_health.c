@@ -572,3 +572,23 @@ void test_the_record_tells_the_cycle_in_32_bytes(void)
     TEST_ASSERT_EQUAL_UINT((unsigned)(h.test_ratio >= 0.0f) * (unsigned)(health_of(f).test_ratio * 32.0f),
                            record.ratio);
 }
+
+/* None can be without damage; the conversion of such a number to an integer would be undefined. */
+void test_the_record_of_a_ratio_that_is_none_is_full_scale(void)
+{
+    static const uint32_t ratios[] = {0xBF800000u, 0xFF800000u, 0x7FC00000u, 0x7F800000u};
+    watched_t w;
+    make_watched(&w);
+    pfl_t *f = ut_filter(&w.config);
+    for (size_t k = 0u; k < (sizeof ratios / sizeof ratios[0]); k++) {
+        pfl_record_t record;
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_begin(f));
+        f->test_ratio = ut_float(ratios[k]);
+        for (uint32_t s = 0u; s < w.config.sensor_count; s++) {
+            f->sensor[s].test_ratio = f->test_ratio;
+        }
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_end(f, PFL_OK));
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_record(f, &record));
+        TEST_ASSERT_EQUAL_UINT(255u, record.ratio);
+    }
+}

@@ -446,6 +446,37 @@ void test_particles_are_copied_whole(void)
     }
 }
 
+/* Counts that no scheme gives, only damaged memory: too few, too many, none, and so large that sums of them wrap. */
+static uint32_t wrong_counts[6];
+
+static void wrong_scheme(pfl_t *f)
+{
+    for (uint32_t i = 0u; i < f->config->particles; i++) {
+        const uint32_t count = wrong_counts[(i < 2u) ? i : (2u + (i % 4u))];
+        memcpy(&f->scratch[i], &count, sizeof count);
+    }
+}
+
+/* The arena's ends are watched by the sanitizers where they are on, its canaries by the library. */
+void test_wrong_counts_write_nothing_outside(void)
+{
+    static const uint32_t counts[] = {0u, 1u, 2u, 3u, 7u, 100u, 0x7FFFFFFFu, 0x80000000u, 0x80000001u, 0xFFFFFFFFu};
+    enum { KINDS_OF_COUNT = sizeof counts / sizeof counts[0] };
+    for (uint32_t trial = 0u; trial < 20000u; trial++) {
+        const uint32_t n = 1u + (ut_random(&dice) % 40u);
+        const uint16_t states = (uint16_t)(1u + (trial % PFL_STATES_MAX));
+        pfl_config_t c = ut_dictated_config(n, states);
+        c.resampling = wrong_scheme;
+        pfl_t *f = ut_filter(&c);
+        for (uint32_t k = 0u; k < 6u; k++) {
+            wrong_counts[k] = counts[ut_random(&dice) % KINDS_OF_COUNT];
+        }
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_resample(f));
+        TEST_ASSERT_TRUE(pfl_invariants_hold(f));
+        ut_arenas_end();
+    }
+}
+
 void test_resampling_is_counted(void)
 {
     enum { N = 20 };

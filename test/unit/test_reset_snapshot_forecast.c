@@ -403,6 +403,7 @@ void test_a_snapshot_that_lies_under_a_right_checksum_is_refused(void)
         {12, 0xBF800000u},
         {12, 0x7FC00000u},
         {13, 0x7F800000u},
+        {13, 0xBF800000u}, /* a test ratio below zero */
         {14, 0x7FC00000u},
         {14, 0x3F7FFFFFu},
         {14, 0x40A00001u},
@@ -415,6 +416,7 @@ void test_a_snapshot_that_lies_under_a_right_checksum_is_refused(void)
         {34, 2u},          /* a refusal by a sensor that is not there */
         {41, 0x7F800000u}, /* best log-likelihood */
         {42, 0x7FC00000u}, /* test ratio before */
+        {42, 0xBF800000u},
         {MOMENTS, 0x7FC00000u},
         {MOMENTS + 4 * 2 + 3, 0xFF800000u}, /* a state */
     };
