@@ -369,8 +369,8 @@ pfl_status_t pfl_restore(pfl_t *f, const void *buffer, size_t buffer_bytes);
 
 /* ---- Trust -------------------------------------------------------------------------------------------------- */
 
-#if defined(PFL_GUARD_CONFIG) &&                                                                                       \
-    (PFL_GUARD_CONFIG == 2) /* a filter holds a copy of its configuration: docs/health.md */
+/* Larger where a filter holds a copy of its configuration (docs/health.md). */
+#if defined(PFL_GUARD_CONFIG) && (PFL_GUARD_CONFIG == 2)
 #define PFL_SELF_TEST_BYTES (PFL_ARENA_BYTES(48, 2, 2) + 512u + sizeof(pfl_config_t))
 #else
 #define PFL_SELF_TEST_BYTES (PFL_ARENA_BYTES(48, 2, 2) + sizeof(pfl_config_t))
