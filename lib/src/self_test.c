@@ -133,7 +133,7 @@ PFL_NOINLINE static void mix_answers(pfl_t *f, uint64_t *hash)
 PFL_NOINLINE static void fly(void *arena, pfl_scheme_fn scheme, uint64_t *hash)
 {
     static const pfl_sensor_t sensor = {.loglik = bearing};
-    const size_t arena_bytes = PFL_ARENA_BYTES(SELF_TEST_PARTICLES, 2, 2);
+    const size_t arena_bytes = PFL_SELF_TEST_BYTES - sizeof(pfl_config_t);
     pfl_config_t *config = (pfl_config_t *)(void *)((unsigned char *)arena + arena_bytes);
     memset(config, 0, sizeof *config);
     config->abi = PFL_ABI;

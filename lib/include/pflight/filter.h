@@ -368,7 +368,12 @@ pfl_status_t pfl_restore(pfl_t *f, const void *buffer, size_t buffer_bytes);
 
 /* ---- Trust -------------------------------------------------------------------------------------------------- */
 
+/* Larger where a filter holds a copy of its configuration (docs/health.md). */
+#if defined(PFL_GUARD_CONFIG) && (PFL_GUARD_CONFIG == 2)
+#define PFL_SELF_TEST_BYTES (PFL_ARENA_BYTES(48, 2, 2) + 512u + sizeof(pfl_config_t))
+#else
 #define PFL_SELF_TEST_BYTES (PFL_ARENA_BYTES(48, 2, 2) + sizeof(pfl_config_t))
+#endif
 
 /* Known answers of random numbers, math, resampling and a short filter run: catches fast-math, contraction to fused
  * multiply-add, flush-to-zero and a wrong rounding mode. arena: PFL_SELF_TEST_BYTES aligned to 8, overwritten (the
