@@ -3,6 +3,8 @@
 
 #include "gps.h"
 #include "land_vehicle.h"
+#include "manoeuvre.h"
+#include "sharp.h"
 #include "standoff.h"
 #include "uav_trajectory.h"
 #include "uwb_range.h"
@@ -12,8 +14,9 @@
 #include <stdlib.h>
 #include <string.h>
 
-const scenario_t *const all_scenarios[] = {&land_vehicle_scenario, &uwb_range_scenario, &standoff_scenario,
-                                           &uav_trajectory_scenario, &gps_scenario};
+const scenario_t *const all_scenarios[] = {&land_vehicle_scenario,   &uwb_range_scenario, &standoff_scenario,
+                                           &uav_trajectory_scenario, &gps_scenario,       &sharp_scenario,
+                                           &manoeuvre_scenario};
 const size_t all_scenarios_count = sizeof all_scenarios / sizeof all_scenarios[0];
 
 const scenario_t *scenario_find(const char *name)
