@@ -2,9 +2,12 @@
  * guidance answers for states all over. Inputs come from integers only. */
 #include "hashing.h"
 
+#include "flights.h"
+
 #include "pflight/pflight.h"
 
 #include <stddef.h>
+#include <stdio.h>
 
 #define N 64u
 #define D 9u
@@ -257,6 +260,17 @@ static void of_hover(void)
     static const float seen[3] = {1.2f, -0.4f, 0.3f};
     of_model("model-hover", pfl_hover_predict, &hover, NULL, 0.0f, 3.0f);
     of_sensor("sensor-biased", pfl_biased_loglik, &biased, seen);
+static void of_flights(void)
+{
+    for (uint32_t k = 0u; k < FLIGHTS; k++) {
+        flown_t flown;
+        char part[32];
+        begin(77u);
+        mix(flight_fly(k, 0u, &flown) ? 1.0f : 0.0f);
+        mix(flown.square);
+        (void)snprintf(part, sizeof part, "flight-%s", flight_names[k]);
+        end(part);
+    }
 }
 
 void of_modules(void)
@@ -269,4 +283,5 @@ void of_modules(void)
     of_waypoints();
     of_wind();
     of_hover();
+    of_flights();
 }
