@@ -14,8 +14,8 @@ static const setting_t settings[] = {
      "of the likelihood: less while the cloud is wide; plain always takes it whole"},
     {"scale", NULL, 1.0, 10000.0, "30", "power=spread: deviation of the cloud at which half of it is used [m]"},
     {"least", NULL, 0.0, 1.0, "0.02", "power=spread: never less, at first"},
-    {"rise", NULL, 1.0, 100000.0, "200", "power=spread: `least` grows by itself in this time [s]"},
-    {"most", NULL, 0.01, 1.0, "0.7", "power=spread: never more"},
+    {"rise", NULL, 1.0, 100000.0, "120",
+     "power=spread: that floor is twice as high after this time, and grows by its square [s]"},
     {"kernel", NULL, 0.01, 0.99, "0.35", "width of the kernel step after resampling; plain has none"},
     {"shape", "shrinking|gaussian|epanechnikov", 0.0, 0.0, "shrinking", "of that step"},
 };
@@ -49,7 +49,6 @@ static bool open_study(const study_t *study, plan_t *plan, failure_t *failure)
     s->kernel_shape = (terrain_shape_t)study_choice(study, "shape");
     s->power_least = (float)study_number(study, "least");
     s->power_rise_s = (float)study_number(study, "rise");
-    s->power_most = (float)study_number(study, "most");
     if (s->filter != TERRAIN_PLAIN && study_is(study, "power", "spread")) {
         s->power_scale_m = (float)study_number(study, "scale");
     }

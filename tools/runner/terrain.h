@@ -31,8 +31,7 @@ typedef struct {
     float kernel_width;
     float power_scale_m; /* of pfl_terrain_power; 0: the whole likelihood from the start */
     float power_least;
-    float power_rise_s; /* after which `least` is twice as large, and so on */
-    float power_most;
+    float power_rise_s; /* `least` grows by the square of the time in it */
     pfl_grid_t grid;
     int16_t *height_m;
     terrain_row_t *row;

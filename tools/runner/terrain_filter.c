@@ -103,8 +103,9 @@ static pfl_terrain_z_t measured(const terrain_study_t *s, const terrain_row_t *r
     pfl_terrain_z_t z = {row->altitude_m, row->agl_m, pfl_sqrtf(variance), 1.0f};
 
     if (s->power_scale_m > 0.0f) {
-        const float least = s->power_least * (1.0f + (float)row->t_s / s->power_rise_s);
-        z.power = s->power_most * pfl_terrain_power(spread_m, s->power_scale_m, least / s->power_most);
+        const float age = (float)row->t_s / s->power_rise_s;
+        const float least = s->power_least * (1.0f + age * age);
+        z.power = pfl_terrain_power(spread_m, s->power_scale_m, least < 1.0f ? least : 1.0f);
     }
     return z;
 }
@@ -190,7 +191,7 @@ bool terrain_fly(const terrain_study_t *s, uint32_t run, terrain_estimate_t *est
     static void (*const move[])(pfl_t *) = {pfl_kernel_move, pfl_kernel_gaussian, pfl_kernel_epanechnikov};
     const pfl_kernel_t kernel = {
         .width = s->kernel_width,
-        .states_mask = s->filter == TERRAIN_RB ? 7u : 31u,
+        .states_mask = 31u,
         .move = move[s->kernel_shape],
     };
     model_t model = make_model(s);
