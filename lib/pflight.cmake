@@ -22,7 +22,12 @@ set(PFLIGHT_LIB_SOURCES
   constraint.c
   kernel.c
   regularised.c
+  scout.c
   tempered.c
+  adaptive.c
+  auxiliary.c
+  parents.c
+  jump.c
   weights.c
   resample.c
   resample_schemes.c
@@ -72,13 +77,16 @@ list(TRANSFORM PFLIGHT_LIB_SOURCES PREPEND "${CMAKE_CURRENT_LIST_DIR}/src/")
 
 set(PFLIGHT_LIB_HEADERS
   pflight.h
+  adaptive.h
   antithetic.h
+  auxiliary.h
   clock.h
   constraints.h
   errors.h
   filter.h
   guidance.h
   health.h
+  jump.h
   marginal.h
   math.h
   models.h

@@ -7,7 +7,8 @@
 #include "pflight/tempered.h"
 
 #include "guard.h"
-#include "lanes.h"
+#include "math_kernels.h"
+#include "scout.h"
 
 #define POWER_HALVINGS 16 /* the least power of a step: 2^-16 of the rest */
 
@@ -26,12 +27,6 @@ void pfl_tempered_loglik(void *user, const void *z, const pfl_view_t *p, float *
 
 /* ---- Scout -------------------------------------------------------------------------------------------------------- */
 
-static uint32_t batch_from(const pfl_t *f, uint32_t first)
-{
-    const uint32_t left = f->config->particles - first;
-    return (left < PFL_BATCH) ? left : PFL_BATCH;
-}
-
 /* One measurement on its way into the filter. */
 typedef struct {
     pfl_tempered_t *m;
@@ -41,30 +36,13 @@ typedef struct {
     float rest; /* of the power, not yet fused */
 } fusion_t;
 
-/* Log-likelihoods of a batch into the scratch column; returns the largest bits, which tell a NaN or a positive one. */
-static int32_t keep(const float *restrict ll, uint32_t n, float *restrict scratch, float *best)
-{
-    int32_t worst = INT32_MIN;
-    float largest = *best;
-    for (uint32_t i = 0u; i < n; i++) {
-        const int32_t bits = pfl_bits(ll[i] - PFL_LOGLIK_SHIFT);
-        worst = (bits > worst) ? bits : worst;
-        largest = (ll[i] > largest) ? ll[i] : largest;
-        scratch[i] = ll[i];
-    }
-    *best = largest;
-    return worst;
-}
-
 /* The whole log-likelihood of all particles into the scratch column. */
 static pfl_status_t scout(pfl_t *f, fusion_t *w)
 {
-    const int32_t minus_infinity = (int32_t)0xFF800000u;
-    int32_t worst = INT32_MIN;
-    w->best = -FLT_MAX;
+    pfl_scout_t found = PFL_SCOUT_NOTHING;
     f->scratch_is_weights = 0u;
     for (uint32_t first = 0u; first < f->config->particles; first += PFL_BATCH) {
-        const uint32_t n = batch_from(f, first);
+        const uint32_t n = pfl_scout_batch(f, first);
         const pfl_view_t view = pfl_guard_view(f, first, n);
         float *ll = pfl_guard_bay(f, n);
         f->busy = 1u;
@@ -74,68 +52,21 @@ static pfl_status_t scout(pfl_t *f, fusion_t *w)
         if (!pfl_guard_bay_is_whole(ll, n)) {
             return PFL_ERR_CORRUPT;
         }
-        const int32_t of_batch = keep(ll, n, &f->scratch[first], &w->best);
-        worst = (of_batch > worst) ? of_batch : worst;
+        pfl_scout_keep(&found, ll, n, &f->scratch[first]);
     }
     pfl_guard_after_batches(f);
-    if (worst <= minus_infinity) {
-        return PFL_OK;
-    }
-    return ((worst >= 0) && (worst < 0x7F800000)) ? PFL_ERR_LOGLIK : PFL_ERR_NONFINITE;
+    w->best = found.best;
+    return pfl_scout_verdict(&found);
 }
 
 /* ---- How much of it at once ------------------------------------------------------------------------------------------ */
-
-/* Log-weights of a batch after a step of that power, padded to whole groups. */
-static void stepped(const pfl_t *f, uint32_t first, uint32_t n, float power, float *restrict s)
-{
-    const float *restrict ll = &f->scratch[first];
-    const float *restrict old = &f->log_weight[first];
-    if (f->weights_equal != 0u) {
-        for (uint32_t i = 0u; i < n; i++) {
-            s[i] = power * ll[i];
-        }
-    } else {
-        const float top = f->log_weight_top;
-        for (uint32_t i = 0u; i < n; i++) {
-            s[i] = (old[i] - top) + (power * ll[i]);
-        }
-    }
-    for (uint32_t i = n; i < (uint32_t)PFL_CEIL8(n); i++) {
-        s[i] = pfl_from_bits((int32_t)0xFF800000u);
-    }
-}
-
-/* Effective sample size after a step of that power. In the work columns, of which there are two at least. */
-PFL_NOINLINE static float ess_after(pfl_t *f, float power)
-{
-    const uint32_t count = f->config->particles;
-    float *s = f->work;
-    float *w = &f->work[PFL_BATCH];
-    float top = -FLT_MAX;
-    for (uint32_t first = 0u; first < count; first += PFL_BATCH) {
-        const uint32_t n = batch_from(f, first);
-        stepped(f, first, n, power, s);
-        for (uint32_t i = 0u; i < n; i++) {
-            top = (s[i] > top) ? s[i] : top;
-        }
-    }
-    memset(f->lanes, 0, sizeof(float) * 2u * PFL_LANES);
-    for (uint32_t first = 0u; first < count; first += PFL_BATCH) {
-        const uint32_t n = batch_from(f, first);
-        stepped(f, first, n, power, s);
-        pfl_lanes_weigh(f->lanes, w, s, top, (uint32_t)PFL_CEIL8(n));
-    }
-    const float sum = pfl_lane_sum(f->lanes);
-    return (sum * sum) / pfl_lane_sum(&f->lanes[PFL_LANES]);
-}
 
 /* The largest power of two times 1 or 1.5 that leaves the effective sample size above the bound, by bisection over its
  * half steps; all of the rest where that is small enough. */
 static float power_of_step(pfl_t *f, const pfl_tempered_t *m, float rest)
 {
     const float bound = m->ess_share * (float)f->config->particles;
-    if (ess_after(f, rest) >= bound) {
+    if (pfl_scout_ess(f, rest) >= bound) {
         return rest;
     }
     int32_t low = -2 * POWER_HALVINGS; /* taken, whatever it leaves */
@@ -144,7 +75,7 @@ static float power_of_step(pfl_t *f, const pfl_tempered_t *m, float rest)
     while ((high - low) > 1) {
         const int32_t middle = (low + high) >> 1;
         const float trial = rest * (pfl_pow2i(middle >> 1) * (((middle & 1) != 0) ? 1.5f : 1.0f));
-        if (ess_after(f, trial) >= bound) {
+        if (pfl_scout_ess(f, trial) >= bound) {
             low = middle;
             power = trial;
         } else {
@@ -187,33 +118,6 @@ static void tell_of_the_whole(pfl_t *f, const fusion_t *w)
     }
 }
 
-/* Multiplies the weights by the scouted likelihood to that power; false when nobody would be left. */
-static bool weigh(pfl_t *f, float power)
-{
-    pfl_weigh_t w;
-    pfl_weigh_start(&w, false);
-    for (uint32_t first = 0u; first < f->config->particles; first += PFL_BATCH) {
-        const uint32_t n = batch_from(f, first);
-        float *restrict ll = f->work;
-        const float *restrict held = &f->scratch[first];
-        for (uint32_t i = 0u; i < n; i++) {
-            ll[i] = power * held[i];
-        }
-        pfl_weigh_batch(f, first, n, ll, &w);
-    }
-    if (w.top_bits >= (int32_t)0xFF800000u) {
-        return false;
-    }
-    float *old = f->log_weight;
-    f->log_weight = f->scratch;
-    f->scratch = old;
-    f->weights_equal = 0u;
-    f->log_weight_top = pfl_from_bits(w.top_bits);
-    f->moments_current = MOMENTS_STALE;
-    pfl_set_best(f, w.top_first);
-    return true;
-}
-
 /* What pfl_update does once the weights are in. */
 static pfl_status_t conclude(pfl_t *f)
 {
@@ -246,7 +150,7 @@ static pfl_status_t go_on(pfl_t *f, fusion_t *w)
         return pfl_fault(f, scouted);
     }
     const float power = last ? w->rest : power_of_step(f, w->m, w->rest);
-    if (!weigh(f, power)) {
+    if (!pfl_scout_weigh(f, power)) {
         return PFL_REJECTED;
     }
     w->m->taken++;

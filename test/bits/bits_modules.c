@@ -2,9 +2,12 @@
  * guidance answers for states all over. Inputs come from integers only. */
 #include "hashing.h"
 
+#include "flights.h"
+
 #include "pflight/pflight.h"
 
 #include <stddef.h>
+#include <stdio.h>
 
 #define N 64u
 #define D 9u
@@ -219,6 +222,19 @@ static void of_waypoints(void)
     end("waypoints");
 }
 
+static void of_flights(void)
+{
+    for (uint32_t k = 0u; k < FLIGHTS; k++) {
+        flown_t flown;
+        char part[32];
+        begin(77u);
+        mix(flight_fly(k, 0u, &flown) ? 1.0f : 0.0f);
+        mix(flown.square);
+        (void)snprintf(part, sizeof part, "flight-%s", flight_names[k]);
+        end(part);
+    }
+}
+
 void of_modules(void)
 {
     of_models();
@@ -227,4 +243,5 @@ void of_modules(void)
     of_field();
     of_predictive_control();
     of_waypoints();
+    of_flights();
 }

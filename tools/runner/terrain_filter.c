@@ -20,6 +20,9 @@
 #define ROW_S 0.5f
 
 #define RADAR 0u
+#define ADAPTIVE_BITS 65536u
+#define ADAPTIVE_LEAST 100u
+#define ADAPTIVE_CELL_M 15.0f
 #define CONVERGED_M 200.0 /* clouds narrower than this are drawn less often */
 
 typedef struct {
@@ -142,7 +145,7 @@ static bool cycle(const terrain_study_t *s, pfl_t *filter, model_t *model, size_
     return check(pfl_estimate(filter, mean, cov), "pfl_estimate", k, failure);
 }
 
-static bool fly(const terrain_study_t *s, pfl_t *filter, model_t *model, terrain_estimate_t *estimate,
+static bool fly(const terrain_study_t *s, pfl_t *filter, model_t *model, pfl_adaptive_t *adaptive, terrain_estimate_t *estimate,
                 run_output_t *out, failure_t *failure)
 {
     const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
@@ -157,8 +160,13 @@ static bool fly(const terrain_study_t *s, pfl_t *filter, model_t *model, terrain
             !check(pfl_health(filter, &health), "pfl_health", k, failure)) {
             return false;
         }
+        estimate[k].particles = adaptive->config.particles;
+        if (s->adaptive && !check(pfl_adapt(filter, adaptive), "pfl_adapt", k, failure)) {
+            return false;
+        }
         spread_m = pfl_sqrtf(cov[0] + cov[PFL_DR_STATES + 1u]);
-        estimate[k] = (terrain_estimate_t){mean[PFL_DR_NORTH], mean[PFL_DR_EAST], mean[PFL_DR_BARO], spread_m};
+        estimate[k] = (terrain_estimate_t){mean[PFL_DR_NORTH], mean[PFL_DR_EAST], mean[PFL_DR_BARO], spread_m,
+                                             estimate[k].particles};
         if (k % 20u == 0u && (k % 200u == 0u || (double)spread_m > CONVERGED_M)) {
             cloud_take(out->cloud, "pf", s->row[k].t_s, filter, PFL_DR_EAST, PFL_DR_NORTH);
         }

@@ -2,13 +2,16 @@
 #ifndef PFLIGHT_PFLIGHT_H
 #define PFLIGHT_PFLIGHT_H
 
+#include "pflight/adaptive.h"
 #include "pflight/antithetic.h"
+#include "pflight/auxiliary.h"
 #include "pflight/clock.h"
 #include "pflight/constraints.h"
 #include "pflight/errors.h"
 #include "pflight/filter.h"
 #include "pflight/guidance.h"
 #include "pflight/health.h"
+#include "pflight/jump.h"
 #include "pflight/marginal.h"
 #include "pflight/math.h"
 #include "pflight/models.h"
