@@ -56,7 +56,8 @@ static bool open_study(const study_t *study, plan_t *plan, failure_t *failure)
     }
     s->as_they_come = true;
     for (size_t k = 1u; k < sizeof settings / sizeof settings[0]; k++) {
-        s->as_they_come = s->as_they_come && (strcmp(study->value[k], settings[k].fallback) == 0 || strcmp(settings[k].key, "adapt") == 0);
+        s->as_they_come = s->as_they_come &&
+                          (strcmp(study->value[k], settings[k].fallback) == 0 || strcmp(settings[k].key, "adapt") == 0);
     }
     s->particles = study->particles;
     s->seed = study->seed;
@@ -158,11 +159,16 @@ static bool run_once(const plan_t *plan, uint32_t run, run_output_t *out, failur
 }
 
 static const campaign_t campaign[] = {
-    {"rb", 20u, {"flight=1"}, 500u},           {"rb", 20u, {"flight=2"}, 500u},
-    {"regularised", 20u, {"flight=1"}, 2000u}, {"regularised", 20u, {"flight=2"}, 2000u},
-    {"regularised", 20u, {"flight=1", "adapt=kld"}, 2000u}, {"regularised", 20u, {"flight=2", "adapt=kld"}, 2000u},
-    {"tempered", 20u, {"flight=1"}, 2000u},    {"tempered", 20u, {"flight=2"}, 2000u},
-    {"plain", 20u, {"flight=1"}, 5000u},       {"plain", 20u, {"flight=2"}, 5000u},
+    {"rb", 20u, {"flight=1"}, 500u},
+    {"rb", 20u, {"flight=2"}, 500u},
+    {"regularised", 20u, {"flight=1"}, 2000u},
+    {"regularised", 20u, {"flight=2"}, 2000u},
+    {"regularised", 20u, {"flight=1", "adapt=kld"}, 2000u},
+    {"regularised", 20u, {"flight=2", "adapt=kld"}, 2000u},
+    {"tempered", 20u, {"flight=1"}, 2000u},
+    {"tempered", 20u, {"flight=2"}, 2000u},
+    {"plain", 20u, {"flight=1"}, 5000u},
+    {"plain", 20u, {"flight=2"}, 5000u},
 };
 
 const scenario_t terrain_scenario = {

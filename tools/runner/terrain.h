@@ -27,7 +27,7 @@ typedef struct {
     terrain_filter_t filter;
     bool second;       /* flight 2 */
     bool as_they_come; /* every setting but flight and adapt is as by default: the acceptance holds */
-    bool adaptive;         /* the number of particles */
+    bool adaptive;     /* the number of particles */
     terrain_shape_t kernel_shape;
     float kernel_width;
     float power_scale_m; /* of pfl_terrain_power; 0: the whole likelihood from the start */
@@ -56,7 +56,15 @@ void terrain_unload(terrain_study_t *s);
 bool terrain_fly(const terrain_study_t *s, uint32_t run, terrain_estimate_t *estimate, run_output_t *out,
                  failure_t *failure);
 
-enum { TERRAIN_RMSE, TERRAIN_WORST, TERRAIN_CONVERGED, TERRAIN_SETTLED_S, TERRAIN_PARTICLES, TERRAIN_RESAMPLED, TERRAIN_VALUES };
+enum {
+    TERRAIN_RMSE,
+    TERRAIN_WORST,
+    TERRAIN_CONVERGED,
+    TERRAIN_SETTLED_S,
+    TERRAIN_PARTICLES,
+    TERRAIN_RESAMPLED,
+    TERRAIN_VALUES
+};
 void terrain_judge(const plan_t *plan, table_t runs, verdict_t *verdict);
 
 #endif
