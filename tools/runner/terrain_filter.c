@@ -21,8 +21,8 @@
 
 #define RADAR 0u
 #define ADAPTIVE_BITS 65536u
-#define ADAPTIVE_LEAST 100u
-#define ADAPTIVE_CELL_M 15.0f
+#define ADAPTIVE_LEAST 200u
+#define ADAPTIVE_CELL_M 8.0f
 #define CONVERGED_M 200.0 /* clouds narrower than this are drawn less often */
 
 typedef struct {
