@@ -222,6 +222,7 @@ static void of_waypoints(void)
     end("waypoints");
 }
 
+<<<<<<< HEAD
 static void of_wind(void)
 {
     static pfl_wind_t wind = {.wind_walk = 0.03f,
@@ -260,6 +261,97 @@ static void of_hover(void)
     static const float seen[3] = {1.2f, -0.4f, 0.3f};
     of_model("model-hover", pfl_hover_predict, &hover, NULL, 0.0f, 3.0f);
     of_sensor("sensor-biased", pfl_biased_loglik, &biased, seen);
+=======
+/* Columns 0 n, 1 .. 2 means, 3 .. 5 a covariance for each, 6 the log-likelihood; n turns the linear part of `each`. */
+static void turn_linear(void *user, const void *u, float dt_s, const pfl_view_t *p, float *drive, float *transition)
+{
+    (void)user;
+    (void)u;
+    for (uint32_t i = 0u; i < p->n; i++) {
+        drive[i] = dt_s + (0.01f * p->x[i]);
+        transition[PFL_MARGINAL_STRIP + i] = 0.1f * p->x[i];
+    }
+}
+
+static void square(void *user, uint32_t k, const pfl_view_t *p, float *h, float *see)
+{
+    (void)user;
+    (void)k;
+    for (uint32_t i = 0u; i < p->n; i++) {
+        h[i] = 0.1f * (p->x[i] * p->x[i]);
+        if (see != NULL) {
+            see[i] = 1.0f + (0.1f * p->x[i]);
+        }
+    }
+}
+
+static void of_marginal(void)
+{
+    static const pfl_marginal_t model = {
+        .measure = square,
+        .linear = 2u,
+        .mean = 1u,
+        .driven = 1u,
+        .measured = 1u,
+        .loglik_state = 6u,
+        .drive = {{0.5f, 0.2f}},
+        .drive_variance = {0.3f},
+        .transition = {{0.9f, 0.1f}, {0.0f, 0.8f}},
+        .drift = {0.1f, -0.2f},
+        .process_cov = {0.2f, 0.05f, 0.3f},
+        .see = {{1.0f, -0.5f}},
+        .see_variance = {0.4f},
+    };
+    static const float seen[1] = {0.7f};
+    static const pfl_marginal_input_t with = {NULL, seen};
+    static const pfl_marginal_input_t without = {NULL, NULL};
+    static float work[PFL_MARGINAL_WORK(2u, 1u)];
+    pfl_marginal_shared_t shared = {.model = model, .cov = {2.0f, 0.3f, 1.0f}};
+    pfl_marginal_each_t each = {.model = model, .matrices = turn_linear, .cov = 3u, .work = work};
+    for (uint32_t form = 0u; form < 2u; form++) {
+        begin(79u);
+        pfl_rng_seed(&rng, 5u);
+        scatter(0.0f, 3.0f);
+        for (uint32_t i = 0u; i < N; i++) {
+            cloud[(3u * N) + i] = between(1.5f, 3.0f);
+            cloud[(4u * N) + i] = between(-0.5f, 0.5f);
+            cloud[(5u * N) + i] = between(1.5f, 3.0f);
+        }
+        for (uint32_t k = 0u; k < 20u; k++) {
+            const pfl_batch_t b = batch((k & 1u) != 0u ? 64u : 37u);
+            const void *in = (k % 3u) != 0u ? &with : &without;
+            pfl_rng_normals(&rng, noise, Q * PFL_BATCH / 16u);
+            if (form == 0u) {
+                pfl_marginal_shared_step(&shared, (k % 3u) != 0u);
+                pfl_marginal_shared_predict(&shared, in, 0.1f, &b);
+            } else {
+                pfl_marginal_each_predict(&each, in, 0.1f, &b);
+            }
+            mix_cloud();
+        }
+        end(form == 0u ? "marginal-shared" : "marginal-each");
+    }
+}
+
+static void of_terrain(void)
+{
+    static int16_t height_m[12u * 9u];
+    static const pfl_grid_t grid = {height_m, 12u, 9u, -5.0f, -4.0f, 1.1f, 0.9f};
+    static pfl_terrain_t radar = {&grid, 0u, 1u, 2u, 0u, 0.12f, 0.01f, 15.0f, 6.5f, 1000.0f};
+    static const pfl_terrain_z_t z = {900.0f, 650.0f, 3.5f, 0.6f};
+    static pfl_dead_reckoning_t motion = {0.1f, 0.998f, 0.07f, 0.1f};
+    static const pfl_dead_reckoning_input_t velocity = {30.0f, -12.0f};
+    begin(80u);
+    for (uint32_t k = 0u; k < (12u * 9u); k++) {
+        height_m[k] = (int16_t)between(200.0f, 300.0f);
+    }
+    of_sensor("terrain", pfl_terrain_loglik, &radar, &z);
+    radar.bias_state = PFL_TERRAIN_NO_BIAS;
+    of_sensor("terrain-no-bias", pfl_terrain_loglik, &radar, &z);
+    of_model("dead-reckoning", pfl_dead_reckoning_rest_predict, &motion, &velocity, 0.0f, 9.0f);
+}
+
+>>>>>>> rb7
 static void of_flights(void)
 {
     for (uint32_t k = 0u; k < FLIGHTS; k++) {
@@ -281,7 +373,12 @@ void of_modules(void)
     of_field();
     of_predictive_control();
     of_waypoints();
+<<<<<<< HEAD
     of_wind();
     of_hover();
+=======
+    of_marginal();
+    of_terrain();
+>>>>>>> rb7
     of_flights();
 }

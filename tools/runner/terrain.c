@@ -14,9 +14,10 @@ static const setting_t settings[] = {
      "of the likelihood: less while the cloud is wide; plain always takes it whole"},
     {"scale", NULL, 1.0, 10000.0, "30", "power=spread: deviation of the cloud at which half of it is used [m]"},
     {"least", NULL, 0.0, 1.0, "0.02", "power=spread: never less, at first"},
-    {"rise", NULL, 1.0, 100000.0, "200", "power=spread: `least` grows by itself in this time [s]"},
-    {"most", NULL, 0.01, 1.0, "0.7", "power=spread: never more"},
+    {"rise", NULL, 1.0, 100000.0, "110",
+     "power=spread: that floor is twice as high after this time, and grows by its square [s]"},
     {"kernel", NULL, 0.01, 0.99, "0.35", "width of the kernel step after resampling; plain has none"},
+    {"adapt", "off|kld", 0.0, 0.0, "off", "number of particles: as said, or as many as the cloud needs, up to that"},
     {"shape", "shrinking|gaussian|epanechnikov", 0.0, 0.0, "shrinking", "of that step"},
 };
 
@@ -47,15 +48,16 @@ static bool open_study(const study_t *study, plan_t *plan, failure_t *failure)
     s->second = study_is(study, "flight", "2");
     s->kernel_width = (float)study_number(study, "kernel");
     s->kernel_shape = (terrain_shape_t)study_choice(study, "shape");
+    s->adaptive = study_is(study, "adapt", "kld");
     s->power_least = (float)study_number(study, "least");
     s->power_rise_s = (float)study_number(study, "rise");
-    s->power_most = (float)study_number(study, "most");
     if (s->filter != TERRAIN_PLAIN && study_is(study, "power", "spread")) {
         s->power_scale_m = (float)study_number(study, "scale");
     }
     s->as_they_come = true;
     for (size_t k = 1u; k < sizeof settings / sizeof settings[0]; k++) {
-        s->as_they_come = s->as_they_come && strcmp(study->value[k], settings[k].fallback) == 0;
+        s->as_they_come = s->as_they_come &&
+                          (strcmp(study->value[k], settings[k].fallback) == 0 || strcmp(settings[k].key, "adapt") == 0);
     }
     s->particles = study->particles;
     s->seed = study->seed;
@@ -97,6 +99,7 @@ static void score(const terrain_study_t *s, const terrain_estimate_t *e, run_out
 {
     double squares = 0.0;
     double worst = 0.0;
+    double particles = 0.0;
     size_t scored = 0u;
     size_t settled = 0u; /* first row from which all are near */
 
@@ -106,6 +109,7 @@ static void score(const terrain_study_t *s, const terrain_estimate_t *e, run_out
         if (s->row[k].t_s >= TERRAIN_SCORED_FROM_S) {
             squares += error * error;
             worst = fmax(worst, error);
+            particles += (double)e[k].particles;
             scored++;
         }
     }
@@ -113,6 +117,7 @@ static void score(const terrain_study_t *s, const terrain_estimate_t *e, run_out
     out->value[TERRAIN_WORST] = worst;
     out->value[TERRAIN_CONVERGED] = worst <= TERRAIN_NEAR_M ? 1.0 : 0.0;
     out->value[TERRAIN_SETTLED_S] = s->row[settled < s->rows ? settled : s->rows - 1u].t_s;
+    out->value[TERRAIN_PARTICLES] = particles / (double)scored;
     out->value[TERRAIN_RESAMPLED] = (double)out->cycle[s->rows - 2u].resampled / (double)(s->rows - 1u);
 }
 
@@ -154,10 +159,16 @@ static bool run_once(const plan_t *plan, uint32_t run, run_output_t *out, failur
 }
 
 static const campaign_t campaign[] = {
-    {"rb", 20u, {"flight=1"}, 500u},           {"rb", 20u, {"flight=2"}, 500u},
-    {"regularised", 20u, {"flight=1"}, 2000u}, {"regularised", 20u, {"flight=2"}, 2000u},
-    {"tempered", 20u, {"flight=1"}, 2000u},    {"tempered", 20u, {"flight=2"}, 2000u},
-    {"plain", 20u, {"flight=1"}, 5000u},       {"plain", 20u, {"flight=2"}, 5000u},
+    {"rb", 20u, {"flight=1"}, 500u},
+    {"rb", 20u, {"flight=2"}, 500u},
+    {"regularised", 20u, {"flight=1"}, 2000u},
+    {"regularised", 20u, {"flight=2"}, 2000u},
+    {"regularised", 20u, {"flight=1", "adapt=kld"}, 2000u},
+    {"regularised", 20u, {"flight=2", "adapt=kld"}, 2000u},
+    {"tempered", 20u, {"flight=1"}, 2000u},
+    {"tempered", 20u, {"flight=2"}, 2000u},
+    {"plain", 20u, {"flight=1"}, 5000u},
+    {"plain", 20u, {"flight=2"}, 5000u},
 };
 
 const scenario_t terrain_scenario = {

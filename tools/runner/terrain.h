@@ -26,13 +26,13 @@ typedef struct {
 typedef struct {
     terrain_filter_t filter;
     bool second;       /* flight 2 */
-    bool as_they_come; /* every setting but flight is as by default: the acceptance holds */
+    bool as_they_come; /* every setting but flight and adapt is as by default: the acceptance holds */
+    bool adaptive;     /* the number of particles */
     terrain_shape_t kernel_shape;
     float kernel_width;
     float power_scale_m; /* of pfl_terrain_power; 0: the whole likelihood from the start */
     float power_least;
-    float power_rise_s; /* after which `least` is twice as large, and so on */
-    float power_most;
+    float power_rise_s; /* `least` grows by the square of the time in it */
     pfl_grid_t grid;
     int16_t *height_m;
     terrain_row_t *row;
@@ -45,6 +45,7 @@ typedef struct {
 /* An estimate after a row. */
 typedef struct {
     float north_m, east_m, baro_m, sigma_m; /* sigma: horizontal deviation of the cloud */
+    uint32_t particles;
 } terrain_estimate_t;
 
 extern const scenario_t terrain_scenario;
@@ -55,7 +56,15 @@ void terrain_unload(terrain_study_t *s);
 bool terrain_fly(const terrain_study_t *s, uint32_t run, terrain_estimate_t *estimate, run_output_t *out,
                  failure_t *failure);
 
-enum { TERRAIN_RMSE, TERRAIN_WORST, TERRAIN_CONVERGED, TERRAIN_SETTLED_S, TERRAIN_RESAMPLED, TERRAIN_VALUES };
+enum {
+    TERRAIN_RMSE,
+    TERRAIN_WORST,
+    TERRAIN_CONVERGED,
+    TERRAIN_SETTLED_S,
+    TERRAIN_PARTICLES,
+    TERRAIN_RESAMPLED,
+    TERRAIN_VALUES
+};
 void terrain_judge(const plan_t *plan, table_t runs, verdict_t *verdict);
 
 #endif

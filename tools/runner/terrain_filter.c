@@ -20,6 +20,9 @@
 #define ROW_S 0.5f
 
 #define RADAR 0u
+#define ADAPTIVE_BITS 65536u
+#define ADAPTIVE_LEAST 200u
+#define ADAPTIVE_CELL_M 8.0f
 #define CONVERGED_M 200.0 /* clouds narrower than this are drawn less often */
 
 typedef struct {
@@ -86,7 +89,7 @@ static pfl_config_t make_config(const terrain_study_t *s, uint32_t run, model_t 
         .states = PFL_DR_STATES,
         .noises = marginal ? 3u : 5u,
         .sensor_count = 1u,
-        .ess_ratio = 0.5f,
+        .ess_ratio = s->adaptive ? 0.0f : 0.5f, /* pfl_adapt resamples */
         .seed = host_random_u64(&random),
         .sensors = sensor,
         .kernel = s->filter == TERRAIN_PLAIN ? NULL : kernel,
@@ -103,8 +106,9 @@ static pfl_terrain_z_t measured(const terrain_study_t *s, const terrain_row_t *r
     pfl_terrain_z_t z = {row->altitude_m, row->agl_m, pfl_sqrtf(variance), 1.0f};
 
     if (s->power_scale_m > 0.0f) {
-        const float least = s->power_least * (1.0f + (float)row->t_s / s->power_rise_s);
-        z.power = s->power_most * pfl_terrain_power(spread_m, s->power_scale_m, least / s->power_most);
+        const float age = (float)row->t_s / s->power_rise_s;
+        const float least = s->power_least * (1.0f + age * age);
+        z.power = pfl_terrain_power(spread_m, s->power_scale_m, least < 1.0f ? least : 1.0f);
     }
     return z;
 }
@@ -141,8 +145,8 @@ static bool cycle(const terrain_study_t *s, pfl_t *filter, model_t *model, size_
     return check(pfl_estimate(filter, mean, cov), "pfl_estimate", k, failure);
 }
 
-static bool fly(const terrain_study_t *s, pfl_t *filter, model_t *model, terrain_estimate_t *estimate,
-                run_output_t *out, failure_t *failure)
+static bool fly(const terrain_study_t *s, pfl_t *filter, model_t *model, pfl_adaptive_t *adaptive,
+                terrain_estimate_t *estimate, run_output_t *out, failure_t *failure)
 {
     const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
     float spread_m = START_SIGMA_M * 1.4142136f;
@@ -151,13 +155,17 @@ static bool fly(const terrain_study_t *s, pfl_t *filter, model_t *model, terrain
         float mean[PFL_DR_STATES];
         float cov[PFL_DR_STATES * PFL_DR_STATES];
         pfl_health_t health;
+        const uint32_t used = adaptive->config.particles;
 
         if (!cycle(s, filter, model, k, spread_m, mean, cov, failure) ||
             !check(pfl_health(filter, &health), "pfl_health", k, failure)) {
             return false;
         }
+        if (s->adaptive && !check(pfl_adapt(filter, adaptive), "pfl_adapt", k, failure)) {
+            return false;
+        }
         spread_m = pfl_sqrtf(cov[0] + cov[PFL_DR_STATES + 1u]);
-        estimate[k] = (terrain_estimate_t){mean[PFL_DR_NORTH], mean[PFL_DR_EAST], mean[PFL_DR_BARO], spread_m};
+        estimate[k] = (terrain_estimate_t){mean[PFL_DR_NORTH], mean[PFL_DR_EAST], mean[PFL_DR_BARO], spread_m, used};
         if (k % 20u == 0u && (k % 200u == 0u || (double)spread_m > CONVERGED_M)) {
             cloud_take(out->cloud, "pf", s->row[k].t_s, filter, PFL_DR_EAST, PFL_DR_NORTH);
         }
@@ -190,21 +198,36 @@ bool terrain_fly(const terrain_study_t *s, uint32_t run, terrain_estimate_t *est
     static void (*const move[])(pfl_t *) = {pfl_kernel_move, pfl_kernel_gaussian, pfl_kernel_epanechnikov};
     const pfl_kernel_t kernel = {
         .width = s->kernel_width,
-        .states_mask = s->filter == TERRAIN_RB ? 7u : 31u,
+        .states_mask = 31u,
         .move = move[s->kernel_shape],
     };
     model_t model = make_model(s);
     model.shared.model.user = &model.motion;
-    const pfl_config_t config = make_config(s, run, &model, &sensor, &kernel);
-    const size_t bytes = PFL_ARENA_BYTES(config.particles, config.states, config.noises);
+    uint32_t *bins = calloc(ADAPTIVE_BITS / 32u, sizeof *bins);
+    pfl_adaptive_t adaptive = {
+        .config = make_config(s, run, &model, &sensor, &kernel),
+        .most = s->particles,
+        .least = s->particles < ADAPTIVE_LEAST ? s->particles : ADAPTIVE_LEAST,
+        .ess_ratio = 0.5f,
+        .error = 0.05f,
+        .quantile = 2.33f,
+        .bits = ADAPTIVE_BITS,
+        .bins = bins,
+        .dimensions = 2u,
+        .state = {PFL_DR_NORTH, PFL_DR_EAST},
+        .inv_width = {1.0f / ADAPTIVE_CELL_M, 1.0f / ADAPTIVE_CELL_M},
+    };
+    const size_t bytes = PFL_ARENA_BYTES(s->particles, PFL_DR_STATES, adaptive.config.noises);
     void *arena = malloc(bytes);
     pfl_t *filter;
 
-    if (arena == NULL) {
-        return fail(failure, EXIT_HARNESS, "no memory for %lu particles", (unsigned long)s->particles);
-    }
-    const bool flown = check(pfl_init(arena, bytes, &config, 0u, &filter), "pfl_init", 0u, failure) &&
-                       fly(s, filter, &model, estimate, out, failure);
+    bool flown = (arena != NULL && bins != NULL) ||
+                 fail(failure, EXIT_HARNESS, "no memory for %lu particles", (unsigned long)s->particles);
+    flown = flown && check(s->adaptive ? pfl_adaptive_init(arena, bytes, &adaptive, 0u, &filter)
+                                       : pfl_init(arena, bytes, &adaptive.config, 0u, &filter),
+                           "pfl_init", 0u, failure);
+    flown = flown && fly(s, filter, &model, &adaptive, estimate, out, failure);
+    free(bins);
     free(arena);
     return flown;
 }

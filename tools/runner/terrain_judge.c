@@ -8,6 +8,7 @@
 #define SEEDS_FOR_MEDIAN 20u
 #define MARGINAL_PARTICLES 500u
 #define OTHER_PARTICLES 2000u
+#define ADAPTIVE_SAVES 3.0 /* particles, once the aircraft is found */
 
 static double largest(table_t runs, size_t column)
 {
@@ -43,6 +44,10 @@ void terrain_judge(const plan_t *plan, table_t runs, verdict_t *verdict)
     }
     verdict_add(verdict, "error_after_200s_m_worst", worst);
     verdict_add(verdict, "settled_s_median", stats_median(runs, TERRAIN_SETTLED_S));
+    metric_t *mean = verdict_add(verdict, "particles_after_200s_mean", stats_mean(runs, TERRAIN_PARTICLES));
+    if (judged && s->adaptive && many) {
+        accept(mean, 0.0, (double)OTHER_PARTICLES / ADAPTIVE_SAVES);
+    }
     verdict_add(verdict, "resampled_share", stats_mean(runs, TERRAIN_RESAMPLED));
     text_add(&verdict->notes,
              "The heights are real, the flight is simulated. Converged: within 60 m from t = 200 s to the "
