@@ -60,6 +60,8 @@ set(PFLIGHT_LIB_SOURCES
   proposal_linear.c
   wind.c
   model_hover.c
+  model_wheels.c
+  pseudorange.c
   sensor_biased.c
 )
 list(TRANSFORM PFLIGHT_LIB_SOURCES PREPEND "${CMAKE_CURRENT_LIST_DIR}/src/")
@@ -77,6 +79,7 @@ set(PFLIGHT_LIB_HEADERS
   per_particle.h
   port.h
   proposal.h
+  pseudorange.h
   rng.h
   sensors.h
   status.h

@@ -13,6 +13,7 @@
 #include "pflight/per_particle.h"
 #include "pflight/port.h"
 #include "pflight/proposal.h"
+#include "pflight/pseudorange.h"
 #include "pflight/rng.h"
 #include "pflight/sensors.h"
 #include "pflight/status.h"
