@@ -75,6 +75,8 @@ set(PFLIGHT_LIB_SOURCES
   model_dead_reckoning.c
   wind.c
   model_hover.c
+  model_wheels.c
+  pseudorange.c
   sensor_biased.c
 )
 list(TRANSFORM PFLIGHT_LIB_SOURCES PREPEND "${CMAKE_CURRENT_LIST_DIR}/src/")
@@ -98,6 +100,7 @@ set(PFLIGHT_LIB_HEADERS
   port.h
   proposal.h
   regularised.h
+  pseudorange.h
   rng.h
   sensors.h
   status.h

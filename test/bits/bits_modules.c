@@ -14,7 +14,7 @@
 #define Q 4u
 
 static float cloud[D * N];
-static float noise[Q * PFL_BATCH];
+static float noise[(Q + 2u) * PFL_BATCH];
 static float ll[N];
 static pfl_rng_t rng;
 
@@ -222,7 +222,6 @@ static void of_waypoints(void)
     end("waypoints");
 }
 
-<<<<<<< HEAD
 static void of_wind(void)
 {
     static pfl_wind_t wind = {.wind_walk = 0.03f,
@@ -261,7 +260,8 @@ static void of_hover(void)
     static const float seen[3] = {1.2f, -0.4f, 0.3f};
     of_model("model-hover", pfl_hover_predict, &hover, NULL, 0.0f, 3.0f);
     of_sensor("sensor-biased", pfl_biased_loglik, &biased, seen);
-=======
+}
+
 /* Columns 0 n, 1 .. 2 means, 3 .. 5 a covariance for each, 6 the log-likelihood; n turns the linear part of `each`. */
 static void turn_linear(void *user, const void *u, float dt_s, const pfl_view_t *p, float *drive, float *transition)
 {
@@ -351,7 +351,6 @@ static void of_terrain(void)
     of_model("dead-reckoning", pfl_dead_reckoning_rest_predict, &motion, &velocity, 0.0f, 9.0f);
 }
 
->>>>>>> rb7
 static void of_flights(void)
 {
     for (uint32_t k = 0u; k < FLIGHTS; k++) {
@@ -365,6 +364,37 @@ static void of_flights(void)
     }
 }
 
+static void clocks_of(void *user, const void *u, float dt_s, const pfl_batch_t *p)
+{
+    pfl_clocks_fused(user);
+    pfl_clocks_predict(user, u, dt_s, p);
+}
+
+static void of_pseudoranges(void)
+{
+    static const pfl_odometry_input_t moving = {3.0f, -0.4f};
+    static const pfl_pseudoranges_t ranges = {
+        3u, {{0.6f, -0.3f, 12.0f, 0.4f, 0u}, {-0.2f, 0.7f, 55.0f, 0.8f, 1u}, {0.1f, 0.1f, -9.0f, 0.05f, 1u}}};
+    static pfl_wheels_t wheels = {0.05f, 0.1f, 0.02f, 0.3f, 0.01f, 0.004f};
+    pfl_pseudorange_t sensor = {.x_state = 0u,
+                                .y_state = 1u,
+                                .clock_state = 5u,
+                                .sigma_m = 8.0f,
+                                .tail_m = 40.0f,
+                                .power = 0.1f,
+                                .clip_m = 30.0f,
+                                .leak = 0.03f,
+                                .gain = 0.05f,
+                                .interval_s = 0.2f};
+    pfl_rng_seed(&rng, 6u);
+    pfl_rng_normals(&rng, &noise[Q * PFL_BATCH], 2u * PFL_BATCH / 16u);
+    of_model("model-wheels", pfl_wheels_predict, &wheels, &moving, 0.0f, 3.0f);
+    of_model("clocks", clocks_of, &sensor, &ranges, 5.0f, 60.0f);
+    of_sensor("sensor-pseudorange", pfl_pseudorange_loglik, &sensor, &ranges);
+    sensor.tail_m = 0.0f;
+    of_sensor("sensor-pseudorange-gauss", pfl_pseudorange_loglik, &sensor, &ranges);
+}
+
 void of_modules(void)
 {
     of_models();
@@ -373,12 +403,10 @@ void of_modules(void)
     of_field();
     of_predictive_control();
     of_waypoints();
-<<<<<<< HEAD
     of_wind();
     of_hover();
-=======
     of_marginal();
     of_terrain();
->>>>>>> rb7
     of_flights();
+    of_pseudoranges();
 }

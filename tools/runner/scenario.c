@@ -1,6 +1,7 @@
 /* The list of scenarios, and the small things that every one of them needs. A new scenario is named here. */
 #include "scenario.h"
 
+#include "car.h"
 #include "gps.h"
 #include "gps_fault.h"
 #include "land_vehicle.h"
@@ -19,9 +20,8 @@
 
 const scenario_t *const all_scenarios[] = {&land_vehicle_scenario,   &uwb_range_scenario, &standoff_scenario,
                                            &uav_trajectory_scenario, &gps_scenario,       &wind_scenario,
-                                           &gps_fault_scenario,      &terrain_scenario};
-                                           &uav_trajectory_scenario, &gps_scenario,       &sharp_scenario,
-                                           &manoeuvre_scenario};
+                                           &gps_fault_scenario,      &car_scenario,       &terrain_scenario,
+                                           &sharp_scenario,          &manoeuvre_scenario};
 const size_t all_scenarios_count = sizeof all_scenarios / sizeof all_scenarios[0];
 
 const scenario_t *scenario_find(const char *name)

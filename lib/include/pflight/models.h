@@ -75,6 +75,30 @@ typedef struct {
 
 void pfl_odometry_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p);
 
+/* ---- The same, with what its odometry gets wrong as states -------------------------------------------------------- */
+/* States: x [m], y [m], heading [rad], scale of the speed, bias of the turn rate [rad/s]. Q = 6: the errors of
+ * pfl_odometry_predict, and a random walk of scale and bias, which a filter then learns instead of being told them. u:
+ * pfl_odometry_input_t. */
+enum {
+    PFL_WHEELS_X = 0,
+    PFL_WHEELS_Y = 1,
+    PFL_WHEELS_HEADING = 2,
+    PFL_WHEELS_SCALE = 3,
+    PFL_WHEELS_BIAS = 4,
+    PFL_WHEELS_STATES = 5
+};
+
+typedef struct {
+    float speed_share;    /* as in pfl_odometry_t */
+    float turn_share;     /* likewise */
+    float sigma_turn;     /* likewise */
+    float sigma_position; /* likewise */
+    float scale_walk;     /* [1/sqrt(s)] */
+    float bias_walk;      /* [rad/s/sqrt(s)] */
+} pfl_wheels_t;
+
+void pfl_wheels_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p);
+
 /* ---- A target on a ring road ------------------------------------------------------------------------------------ */
 /* States as those of constant velocity: x, y [m], vx, vy [m/s]; Q = 2; u: not used. The velocity turns with the road, and
  * no particle leaves it. Accelerations a = sigma w / sqrt(dt), held over the step. With r the distance from the center,

@@ -19,6 +19,7 @@
 #include "pflight/port.h"
 #include "pflight/proposal.h"
 #include "pflight/regularised.h"
+#include "pflight/pseudorange.h"
 #include "pflight/rng.h"
 #include "pflight/sensors.h"
 #include "pflight/status.h"
