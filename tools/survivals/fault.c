@@ -86,10 +86,11 @@ static uint32_t kinds_of(region_t region)
     return ((uint32_t)region < MEMORY_REGIONS) ? (uint32_t)DAMAGES : special[(uint32_t)region - MEMORY_REGIONS];
 }
 
+/* A stuck word comes back while callbacks run, wherever it struck first. */
 const char *fault_region_name(const fault_t *f)
 {
-    const bool between = (f->region != REGION_CONFIG) || !f->inside;
-    return between ? region_names[f->region] : "configuration, in a callback";
+    const bool within = (f->region == REGION_CONFIG) && (f->inside || (f->kind == DAMAGE_STUCK));
+    return within ? "configuration, in a callback" : region_names[f->region];
 }
 
 const char *fault_kind_name(const fault_t *f)
@@ -99,6 +100,10 @@ const char *fault_kind_name(const fault_t *f)
     return ((uint32_t)f->region < MEMORY_REGIONS) ? damage_names[f->kind]
                                                   : special[(uint32_t)f->region - MEMORY_REGIONS][f->kind];
 }
+
+/* Of a cycle without a refusal: a predict, whose first batch is a group of its own, and the sensors' updates. */
+#define BATCHES(n) (((n) + (PFL_BATCH - 1u)) / PFL_BATCH)
+#define CALLBACKS (1u + BATCHES(PARTICLES - PFL_GROUP) + (SENSORS * BATCHES(PARTICLES)))
 
 /* ---- Drawing -------------------------------------------------------------------------------------------------------- */
 
@@ -135,7 +140,7 @@ fault_t fault_of_run(uint64_t run_seed, uint32_t first, uint32_t last, uint32_t 
     f.kind = (uint32_t)(host_random_u64(&random) % kinds_of(f.region));
     f.inside = (host_random_u64(&random) >> 63) != 0u;
     f.first = first + (uint32_t)(host_random_u64(&random) % (last - first + 1u));
-    f.point = (uint32_t)(host_random_u64(&random) % (f.inside ? 9u : 6u));
+    f.point = (uint32_t)(host_random_u64(&random) % (f.inside ? CALLBACKS : 6u));
     f.sensor = (uint32_t)(host_random_u64(&random) % SENSORS);
     f.where[0] = host_random_u64(&random);
     f.where[1] = host_random_u64(&random);

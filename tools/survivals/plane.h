@@ -9,6 +9,7 @@
 #include "core.h"
 
 #define STATUSES (3u + SENSORS)
+#define PARTICLES 100u
 #define PARTICLES_MOST 104u
 #define COPY_ROOM ((PFL_GUARD_CONFIG == 2) ? 1024u : 0u) /* for the filters' copies of their configurations */
 #define ARENA_BYTES (PFL_ARENA_BYTES(PARTICLES_MOST, STATES, 4) + PFL_WATCH_BYTES(SENSORS) + COPY_ROOM)

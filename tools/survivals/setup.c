@@ -170,7 +170,7 @@ void setup_filter(settings_t *s, const plan_t *plan)
     s->watch.keep = pfl_watch_keep;
     pfl_config_t *c = &s->config;
     c->abi = PFL_ABI;
-    c->particles = 100u;
+    c->particles = PARTICLES;
     c->states = STATES;
     c->noises = 4u;
     c->sensor_count = SENSORS;
