@@ -84,6 +84,17 @@ void test_bounce_reverses_and_clamp_leaves_the_speed(void)
     expect(0u, 100.0, 0.0, 3.0, 4.0, 1e-4);
 }
 
+/* At 1e-12 m from the center a particle still has a direction, nearer it takes that of x. */
+void test_the_smallest_distance_from_the_center_still_has_a_direction(void)
+{
+    const pfl_batch_t p = batch_of(2u);
+    set(0u, 0.0f, 1.0e-12f, 0.0f, 0.0f);
+    set(1u, 0.0f, 0.5e-12f, 0.0f, 0.0f);
+    pfl_ring_clamp(&ring, &p);
+    expect(0u, 0.0, 96.0, 0.0, 0.0, 1e-4);
+    expect(1u, 96.0, 0.0, 0.0, 0.0, 1e-4);
+}
+
 /* Whatever was projected counts as inside, on any ring, around the origin or far from it. */
 void test_what_was_projected_is_inside(void)
 {
