@@ -18,18 +18,17 @@ void pfl_kernel_gaussian(pfl_t *f)
     pfl_kernel_spread(f, 0.0f, NULL);
 }
 
-/* The squares of the four normals that are not used for anything else, added up. */
+/* The squares of the four normals that are not used for anything else, added up; two at a time, for the stack. */
 static void sum_of_four(pfl_t *f, uint32_t n, float *restrict sum)
 {
     for (uint32_t i = 0u; i < n; i += PFL_GROUP) {
-        float four[MORE_NORMALS * PFL_GROUP];
-        pfl_rng_normals(&f->rng, four, MORE_NORMALS);
-        for (uint32_t k = 0u; k < PFL_GROUP; k++) {
-            const float a = four[k];
-            const float b = four[PFL_GROUP + k];
-            const float c = four[(2u * PFL_GROUP) + k];
-            const float d = four[(3u * PFL_GROUP) + k];
-            sum[i + k] = ((a * a) + (b * b)) + ((c * c) + (d * d));
+        float two[2u * PFL_GROUP];
+        for (uint32_t pair = 0u; pair < 2u; pair++) {
+            pfl_rng_normals(&f->rng, two, 2u);
+            for (uint32_t k = 0u; k < PFL_GROUP; k++) {
+                const float squares = (two[k] * two[k]) + (two[PFL_GROUP + k] * two[PFL_GROUP + k]);
+                sum[i + k] = (pair == 0u) ? squares : (sum[i + k] + squares);
+            }
         }
     }
 }

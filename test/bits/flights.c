@@ -246,6 +246,7 @@ bool flight_fly(uint32_t number, uint32_t budget_cycles, flown_t *flown)
     }
     for (uint32_t k = 1u; k <= FLIGHT_STEPS; k++) {
         move_truth(&w);
+        flown->particles[k - 1u] = w.adaptive.config.particles;
         flown->particle_steps += w.adaptive.config.particles;
         const uint32_t begun = pfl_port_cycles();
         const pfl_status_t status = cycle(&w, (uint64_t)k * STEP_US);

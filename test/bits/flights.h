@@ -14,6 +14,7 @@ typedef struct {
     uint32_t cycles;         /* of the port's counter, all cycles */
     uint32_t cycles_max;
     uint32_t overruns;
+    uint32_t particles[FLIGHT_STEPS];
     float square; /* sum of the squared errors of the position, against the truth */
 } flown_t;
 

@@ -1,5 +1,5 @@
 /* Flies each kind of filter once (test/bits/flights.h) and prints a line for it: hash of all estimates, particle-steps,
- * cycles of the port's counter over all and of the worst cycle, overruns, root mean square error of the position in um. Then
+ * cycles of the port's counter over all and of the worst cycle, overruns, root mean square error of the position in um, particles cycle by cycle. Then
  * the adaptive filter by time: with all the time it wants, and with 60 % of what its worst cycle took. Without an operating
  * system too; tools/filters runs it and explains the figures. */
 #include "../../test/bits/flights.h"
@@ -49,6 +49,10 @@ static bool fly(const char *name, uint32_t number, uint32_t budget_cycles, flown
     say(" budget=", budget_cycles);
     say(" overruns=", flown->overruns);
     say(" rms_um=", (uint32_t)(int32_t)(1.0e6f * pfl_sqrtf(flown->square / (float)FLIGHT_STEPS)));
+    say(" particles=", flown->particles[0]);
+    for (uint32_t k = 1u; k < FLIGHT_STEPS; k++) {
+        say(",", flown->particles[k]);
+    }
     io_text("\n");
     return flew;
 }

@@ -19,7 +19,7 @@ extern "C" {
  * particles. O(N D^2) in a step that resamples. */
 void pfl_kernel_gaussian(pfl_t *f);     /* n standard normal */
 void pfl_kernel_epanechnikov(pfl_t *f); /* n bounded, |n| < sqrt(d + 4), of unit variance: no particle far out. Four
-                                           normals a particle more; d: states that take part. Stack: 256 B more */
+                                           normals a particle more; d: states that take part. Stack: 128 B more */
 
 /* The widths of least mean integrated squared error for a Gaussian density (Silverman 1986), as pfl_kernel_t.width: the
  * deviation of the noise in those of the cloud. particles: N >= 1; states: 1 .. PFL_STATES_MAX, those that take part.
