@@ -17,6 +17,8 @@ WHAT = {
     "one_constant_velocity": "constant_velocity, written for one particle (per_particle.h)",
     "one_land_vehicle": "land_vehicle, written for one particle, with a call of pfl_sincosf",
     "one_position": "position, written for one particle",
+    "marginal_shared": "two linear states drive two, none seen (marginal.h)", "marginal_shared_seen": "two drive one, and are seen",
+    "marginal_each_seen": "the same with a covariance each", "terrain": "its lookups in the grid are scalar",
     "predict": "a whole pfl_predict, 4 states, 2 noises", "update": "a whole pfl_update, 2 states seen, no resampling",
     "mean": "normalise, effective sample size, mean", "mean_covariance": "the same with the covariance",
     "mean_circular": "the same without it, one state an angle", "resample_equal": "running sums and offspring alone: nothing to copy",
@@ -30,7 +32,8 @@ CAN_VECTORISE = {
     "road_target": 4.0, "lane_target": 3.0, "planar_uav": 4.0, "planar_uav_euler": 4.0, "autopilot": 4.0, "autopilot_wind": 4.0,
     "coast": 3.0, "turn": 4.0, "turn_redraw": 3.0,
     "position": 3.0, "position_one": 3.0, "position_distance": 4.0, "range": 3.0, "range_student": 4.0, "range_bearing": 4.0,
-    "coloured": 3.0, "velocity": 4.0,
+    "coloured": 3.0, "velocity": 4.0, "dead_reckoning_rest": 2.0, "marginal_shared": 2.0, "marginal_shared_seen": 2.0,
+    "marginal_each_seen": 2.0, "terrain": 1.5,
     "one_constant_velocity": 3.0, "one_position": 3.0, "mean": 3.0, "mean_covariance": 3.0, "mean_circular": 3.0,
 }
 # autopilot_route looks up each particle's waypoint; one_land_vehicle calls a function for each; the eight streams alone are

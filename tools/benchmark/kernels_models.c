@@ -136,6 +136,67 @@ KERNEL(turn_redraw)
     move(pfl_turn_predict, &model, NULL);
 }
 
+/* ---- The marginalised filter, around a model that does nothing ------------------------------------------------------- */
+
+/* Two linear states at 1 and 2, a covariance each at 3 .. 5, the log-likelihood at 6; both or one of them drive. */
+static const pfl_marginal_t marginal = {
+    .linear = 2u,
+    .mean = 1u,
+    .driven = 1u,
+    .state = {0u, 7u},
+    .noise = {0u, 1u},
+    .measured = 1u,
+    .loglik_state = 6u,
+    .drive = {{0.1f, 0.0f}, {0.0f, 0.1f}},
+    .drive_variance = {0.3f, 0.3f},
+    .transition = {{0.99f, 0.0f}, {0.0f, 0.99f}},
+    .process_cov = {0.2f, 0.0f, 0.3f},
+    .see = {{1.0f, -0.5f}},
+    .see_variance = {0.4f},
+};
+static const float marginal_z[1] = {5.0f};
+static const pfl_marginal_input_t marginal_input = {NULL, marginal_z};
+
+KERNEL(marginal_shared)
+{
+    static pfl_marginal_shared_t shared;
+    shared = (pfl_marginal_shared_t){.model = marginal, .cov = {2.0f, 0.0f, 1.0f}};
+    shared.model.driven = 2u;
+    shared.model.measured = 0u;
+    pfl_marginal_shared_step(&shared, false);
+    move(pfl_marginal_shared_predict, &shared, &marginal_input);
+}
+
+KERNEL(marginal_shared_seen)
+{
+    static pfl_marginal_shared_t shared;
+    shared = (pfl_marginal_shared_t){.model = marginal, .cov = {2.0f, 0.0f, 1.0f}};
+    pfl_marginal_shared_step(&shared, true);
+    move(pfl_marginal_shared_predict, &shared, &marginal_input);
+}
+
+static void prepare_each(void)
+{
+    for (uint32_t i = 0u; i < KERNEL_N; i++) {
+        kernel_data.x[4][i] -= 10.0f; /* beside variances of about 10 */
+    }
+}
+
+KERNEL(marginal_each_seen)
+{
+    static float work[PFL_MARGINAL_WORK(2u, 1u)];
+    static pfl_marginal_each_t each;
+    each = (pfl_marginal_each_t){.model = marginal, .cov = 3u, .work = work};
+    move(pfl_marginal_each_predict, &each, &marginal_input);
+}
+
+KERNEL(dead_reckoning_rest)
+{
+    static const pfl_dead_reckoning_t model = {0.1f, 0.99f, 0.07f, 0.1f};
+    static const pfl_dead_reckoning_input_t u = {30.0f, -12.0f};
+    move(pfl_dead_reckoning_rest_predict, &model, &u);
+}
+
 const kernel_t kernels_models[] = {
     {"land_vehicle", kernel_land_vehicle, NULL},
     {"land_vehicle_jitter", kernel_land_vehicle_jitter, NULL},
@@ -152,6 +213,10 @@ const kernel_t kernels_models[] = {
     {"coast", kernel_coast, NULL},
     {"turn", kernel_turn, NULL},
     {"turn_redraw", kernel_turn_redraw, NULL},
+    {"marginal_shared", kernel_marginal_shared, NULL},
+    {"marginal_shared_seen", kernel_marginal_shared_seen, NULL},
+    {"marginal_each_seen", kernel_marginal_each_seen, prepare_each},
+    {"dead_reckoning_rest", kernel_dead_reckoning_rest, NULL},
 };
 const uint32_t kernels_models_count = sizeof kernels_models / sizeof kernels_models[0];
 
@@ -209,6 +274,15 @@ KERNEL(velocity)
     weigh(pfl_velocity_loglik, &sensor, seen);
 }
 
+KERNEL(terrain)
+{
+    static int16_t height_m[32u * 32u];
+    static const pfl_grid_t grid = {height_m, 32u, 32u, 0.0f, 0.0f, 1.0f, 1.0f};
+    static const pfl_terrain_t sensor = {&grid, 0u, 1u, 2u, 0u, 0.12f, 0.01f, 15.0f, 6.5f, 1000.0f};
+    static const pfl_terrain_z_t z = {900.0f, 890.0f, 3.5f, 1.0f};
+    weigh(pfl_terrain_loglik, &sensor, &z);
+}
+
 const kernel_t kernels_sensors[] = {
     {"position", kernel_position, NULL},
     {"position_one", kernel_position_one, NULL},
@@ -218,5 +292,6 @@ const kernel_t kernels_sensors[] = {
     {"range_bearing", kernel_range_bearing, NULL},
     {"coloured", kernel_coloured, NULL},
     {"velocity", kernel_velocity, NULL},
+    {"terrain", kernel_terrain, NULL},
 };
 const uint32_t kernels_sensors_count = sizeof kernels_sensors / sizeof kernels_sensors[0];

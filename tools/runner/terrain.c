@@ -165,6 +165,8 @@ static const campaign_t campaign[] = {
     {"regularised", 20u, {"flight=2"}, 2000u},
     {"regularised", 20u, {"flight=1", "adapt=kld"}, 2000u},
     {"regularised", 20u, {"flight=2", "adapt=kld"}, 2000u},
+    {"regularised", 20u, {"flight=1"}, 500u},
+    {"regularised", 20u, {"flight=2"}, 500u},
     {"tempered", 20u, {"flight=1"}, 2000u},
     {"tempered", 20u, {"flight=2"}, 2000u},
     {"plain", 20u, {"flight=1"}, 5000u},
