@@ -14,6 +14,7 @@
 #include "pflight/port.h"
 #include "pflight/proposal.h"
 #include "pflight/pseudorange.h"
+#include "pflight/range_bias.h"
 #include "pflight/rng.h"
 #include "pflight/sensors.h"
 #include "pflight/status.h"
