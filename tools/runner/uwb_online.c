@@ -97,9 +97,15 @@ static model_t make_model(const uwb_study_t *s)
     return model;
 }
 
-static bool check(pfl_status_t status, const char *call, size_t i, failure_t *failure)
+/* One range: predicted to, fused, and the estimate after it. */
+static bool cycle(model_t *model, pfl_t *filter, const input_t *input, const pfl_range_bias_z_t *z, uint64_t t_us,
+                  float *mean)
 {
-    return status >= 0 || fail(failure, EXIT_HARNESS, "range %zu: %s: %s", i, call, pfl_status_string(status));
+    bool done = pfl_predict(filter, t_us, input) >= 0 && pfl_update(filter, 0u, t_us, z) >= 0 &&
+                pfl_estimate(filter, mean, NULL) >= 0;
+
+    pfl_range_bias_fused(&model->biases, z);
+    return done;
 }
 
 static bool fly(const uwb_study_t *s, model_t *model, pfl_t *filter, float *estimate, run_output_t *out,
@@ -108,31 +114,28 @@ static bool fly(const uwb_study_t *s, model_t *model, pfl_t *filter, float *esti
     const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
     pfl_range_bias_z_t z[2];
     const pfl_range_bias_z_t *fused = NULL;
+    uint64_t before_us = 0u;
 
     for (size_t i = 0u; i < s->ranges; i++) {
         const uwb_range_t *range = &s->range[i];
         const uwb_anchor_t *anchor = &s->anchor[range->anchor];
         const input_t input = {fused, &range->odometry};
-        pfl_range_bias_z_t *now = &z[i % 2u];
+        /* Ranges at one time: no predict would move the first one in, so the next one waits a microsecond. */
+        const uint64_t t_us = i > 0u && range->t_us <= before_us ? before_us + 1u : range->t_us;
         float mean[PFL_STATES_MAX];
         pfl_health_t health;
 
         if (s->indoor && i == UWB_INDOOR_SETTLING) {
             model->biases.sigma_m = INDOOR_SIGMA_M;
         }
-        *now = (pfl_range_bias_z_t){anchor->x_m, anchor->y_m, anchor->height_m, range->range_m,
-                                    s->indoor ? 0u : range->anchor};
-        /* Two ranges at one time: no predict moves the first one in, so the second waits a microsecond. */
-        const uint64_t t_us = range->t_us + (i > 0u && range->t_us == range[-1].t_us ? 1u : 0u);
-        pfl_range_bias_move(&model->biases, i > 0u ? (float)(t_us - range[-1].t_us) * 1e-6f : 0.0f);
-        if (!check(pfl_predict(filter, t_us, &input), "pfl_predict", i, failure) ||
-            !check(pfl_update(filter, 0u, t_us, now), "pfl_update", i, failure) ||
-            !check(pfl_estimate(filter, mean, NULL), "pfl_estimate", i, failure) ||
-            !check(pfl_health(filter, &health), "pfl_health", i, failure)) {
-            return false;
+        z[i % 2u] = (pfl_range_bias_z_t){anchor->x_m, anchor->y_m, anchor->height_m, range->range_m,
+                                         s->indoor ? 0u : range->anchor};
+        pfl_range_bias_move(&model->biases, (float)(t_us - before_us) * 1e-6f);
+        if (!cycle(model, filter, &input, &z[i % 2u], t_us, mean) || pfl_health(filter, &health) != PFL_OK) {
+            return fail(failure, EXIT_HARNESS, "range %zu: the filter gave no estimate", i);
         }
-        pfl_range_bias_fused(&model->biases, now);
-        fused = now;
+        fused = &z[i % 2u];
+        before_us = t_us;
         estimate[2u * i] = mean[0];
         estimate[2u * i + 1u] = mean[1];
         out->cycles_ns[i] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
@@ -170,8 +173,9 @@ bool uwb_online(const uwb_study_t *s, uint32_t run, float *estimate, run_output_
     if (arena == NULL) {
         return fail(failure, EXIT_HARNESS, "no memory for %lu particles", (unsigned long)s->particles);
     }
-    const bool flown = check(pfl_init(arena, bytes, &config, 0u, &filter), "pfl_init", 0u, failure) &&
-                       fly(s, &model, filter, estimate, out, failure);
+    const pfl_status_t status = pfl_init(arena, bytes, &config, 0u, &filter);
+    const bool flown = status == PFL_OK ? fly(s, &model, filter, estimate, out, failure)
+                                        : fail(failure, EXIT_HARNESS, "pfl_init: %s", pfl_status_string(status));
     free(arena);
     return flown;
 }
