@@ -77,6 +77,7 @@ set(PFLIGHT_LIB_SOURCES
   model_hover.c
   model_wheels.c
   pseudorange.c
+  range_bias.c
   sensor_biased.c
 )
 list(TRANSFORM PFLIGHT_LIB_SOURCES PREPEND "${CMAKE_CURRENT_LIST_DIR}/src/")
@@ -101,6 +102,7 @@ set(PFLIGHT_LIB_HEADERS
   proposal.h
   regularised.h
   pseudorange.h
+  range_bias.h
   rng.h
   sensors.h
   status.h

@@ -395,6 +395,28 @@ static void of_pseudoranges(void)
     of_sensor("sensor-pseudorange-gauss", pfl_pseudorange_loglik, &sensor, &ranges);
 }
 
+static void learnt_bias(void *user, const void *u, float dt_s, const pfl_batch_t *p)
+{
+    pfl_range_bias_move(user, dt_s);
+    pfl_range_bias_fused(user, u);
+    pfl_range_bias_correct(user, u, p);
+}
+
+static void of_range_bias(void)
+{
+    static const pfl_range_bias_z_t range = {1.0f, -2.0f, 0.5f, 4.0f, 1u};
+    static pfl_range_bias_t biases = {.x_state = 0u,
+                                      .y_state = 1u,
+                                      .bias_state = 4u,
+                                      .anchors = 2u,
+                                      .sigma_m = 0.1f,
+                                      .dof = 3.0f,
+                                      .walk = 0.01f,
+                                      .variance_m2 = {0.0025f, 0.0025f}};
+    of_model("range-bias", learnt_bias, &biases, &range, 0.0f, 3.0f);
+    of_sensor("sensor-range-bias", pfl_range_bias_loglik, &biases, &range);
+}
+
 void of_modules(void)
 {
     of_models();
@@ -409,4 +431,5 @@ void of_modules(void)
     of_terrain();
     of_flights();
     of_pseudoranges();
+    of_range_bias();
 }

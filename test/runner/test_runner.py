@@ -260,5 +260,43 @@ class Everything(unittest.TestCase):
                     self.assertIn(empty, done.stderr)
 
 
+DATA = pathlib.Path(os.environ.get("PFLIGHT_DATA", ROOT / ".." / "shared" / "data"))
+
+
+class Recordings(unittest.TestCase):
+    """A quick run of each scenario on a recording: our filter within its acceptance, the simpler one beside it worse."""
+
+    def compare(self, folder, scenario, better, simpler, metric, *arguments):
+        if not (DATA / folder).is_dir():
+            self.skipTest(f"no recording in {DATA / folder}")
+        results = []
+        for name in (better, simpler):
+            done, result = run_json(scenario, "--filter", name, "--runs", "2", *arguments)
+            self.assertEqual((0, ""), (done.returncode, done.stderr), name)
+            results.append(result["metrics"][metric]["mean"])
+        self.assertLess(results[0], results[1])
+
+    def test_wind(self):
+        for flight, folder in (("px4", "fixedwing_px4_proto"), ("x8", "fixedwing_x8")):
+            with self.subTest(flight=flight):
+                self.compare(folder, "wind", "marginalised", "bootstrap", "outage_60s_m", "--set", f"flight={flight}")
+
+    def test_gps_fault(self):
+        self.compare("multirotor_gps_glitch", "gps-fault", "gated", "ungated", "height_max_m")
+
+    def test_car(self):
+        self.compare("gnss_car_berlin", "car", "mixture", "odometry", "rmse_m")
+
+    def test_uwb_range_without_calibration(self):
+        if not (DATA / "uwb_outdoor").is_dir():
+            self.skipTest(f"no recording in {DATA / 'uwb_outdoor'}")
+        found = {}
+        for bias in ("common", "online"):
+            done, result = run_json("uwb-range", "--set", f"bias={bias}", "--runs", "3")
+            self.assertEqual((0, ""), (done.returncode, done.stderr), bias)
+            found[bias] = result["metrics"]["rmse_m_median"]["mean"]
+        self.assertLess(found["online"], found["common"])
+
+
 if __name__ == "__main__":
     unittest.main()

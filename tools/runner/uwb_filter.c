@@ -30,11 +30,10 @@ static float uniform_of(float a, float b, float *angle)
 }
 
 /* Outdoors: the ring of the first range, give or take, in every direction. */
-static void draw_ring(void *user, const pfl_batch_t *p)
+void uwb_draw_ring(const uwb_study_t *s, float bias_m, const pfl_batch_t *p)
 {
-    const uwb_study_t *s = ((const model_t *)user)->study;
     const uwb_anchor_t *anchor = &s->anchor[s->range[0].anchor];
-    const float slant_m = s->range[0].range_m - anchor->bias_m;
+    const float slant_m = s->range[0].range_m - bias_m;
     const float square = slant_m * slant_m - anchor->height_m * anchor->height_m;
     const float radius_m = pfl_sqrtf(square > 0.0f ? square : 0.0f);
 
@@ -52,10 +51,16 @@ static void draw_ring(void *user, const pfl_batch_t *p)
     }
 }
 
-/* Indoors: anywhere in the box of the anchors, any heading. */
-static void draw_box(void *user, const pfl_batch_t *p)
+static void draw_ring(void *user, const pfl_batch_t *p)
 {
     const uwb_study_t *s = ((const model_t *)user)->study;
+
+    uwb_draw_ring(s, s->anchor[s->range[0].anchor].bias_m, p);
+}
+
+/* Indoors: anywhere in the box of the anchors, any heading. */
+void uwb_draw_box(const uwb_study_t *s, const pfl_batch_t *p)
+{
     float lo_x = s->anchor[0].x_m;
     float hi_x = lo_x;
     float lo_y = s->anchor[0].y_m;
@@ -74,6 +79,11 @@ static void draw_box(void *user, const pfl_batch_t *p)
         PFL_STATE(p, PFL_ODO_Y)[i] = lo_y + (hi_y - lo_y) * (0.5f + 0.5f * angle / PFL_PI);
         PFL_STATE(p, PFL_ODO_HEADING)[i] = pfl_wrap_pi(10.0f * PFL_NOISE(p, 2)[i]); /* uniform to e^-50 */
     }
+}
+
+static void draw_box(void *user, const pfl_batch_t *p)
+{
+    uwb_draw_box(((const model_t *)user)->study, p);
 }
 
 static model_t make_model(const uwb_study_t *s)

@@ -29,6 +29,8 @@ typedef struct {
     bool indoor;
     bool los;         /* outdoors: the line-of-sight recording */
     bool common_bias; /* outdoors: one range bias for all anchors, rather than one each */
+    bool online;      /* the biases of the anchors and the wheels are states: nothing is calibrated */
+    bool blind;       /* and not even the size of the biases is known */
     bool gaussian;    /* likelihood without tails, to see what they are for */
     uwb_anchor_t anchor[UWB_ANCHORS_MAX];
     uint32_t anchors;
@@ -45,6 +47,13 @@ bool uwb_load(uwb_study_t *s, const char *data, const char *set, failure_t *fail
 
 /* Flies the filter over the ranges: estimates (x, y) after each of them, and the cycles. */
 bool uwb_filter(const uwb_study_t *s, uint32_t run, float *estimate, run_output_t *out, failure_t *failure);
+
+/* The same with biases as states. */
+bool uwb_online(const uwb_study_t *s, uint32_t run, float *estimate, run_output_t *out, failure_t *failure);
+
+/* Particles anywhere in the ring of the first range, and in the box of the anchors: x, y out of two normals each. */
+void uwb_draw_ring(const uwb_study_t *s, float bias_m, const pfl_batch_t *p);
+void uwb_draw_box(const uwb_study_t *s, const pfl_batch_t *p);
 
 /* Metrics of the runs' rmse, p95, max and resampled share. */
 enum { UWB_RMSE, UWB_P95, UWB_MAX, UWB_RESAMPLED, UWB_VALUES };

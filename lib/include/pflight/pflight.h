@@ -20,6 +20,7 @@
 #include "pflight/proposal.h"
 #include "pflight/pseudorange.h"
 #include "pflight/regularised.h"
+#include "pflight/range_bias.h"
 #include "pflight/rng.h"
 #include "pflight/sensors.h"
 #include "pflight/status.h"
