@@ -108,6 +108,7 @@ set(PFLIGHT_LIB_HEADERS
   status.h
   tempered.h
   terrain.h
+  version.h
   waypoints.h
   wind.h
 )

@@ -26,6 +26,7 @@
 #include "pflight/status.h"
 #include "pflight/tempered.h"
 #include "pflight/terrain.h"
+#include "pflight/version.h"
 #include "pflight/waypoints.h"
 #include "pflight/wind.h"
 
