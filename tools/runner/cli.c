@@ -120,6 +120,28 @@ static bool is_choice(const char *choices, const char *value)
     return true;
 }
 
+/* Where the last choice is "...": names of the others, with commas between. */
+static bool is_list_of_choices(const char *choices, const char *value)
+{
+    const size_t length = strlen(choices);
+    char one[LIST_MAX];
+
+    if (length < 4u || strcmp(choices + length - 4u, "|...") != 0) {
+        return false;
+    }
+    for (;;) {
+        const size_t end = strcspn(value, ",");
+        (void)snprintf(one, sizeof one, "%.*s", (int)end, value);
+        if (!is_choice(choices, one) || strcmp(one, "...") == 0) {
+            return false;
+        }
+        if (value[end] == '\0') {
+            return true;
+        }
+        value += end + 1u;
+    }
+}
+
 /* All names of scenarios, with commas. */
 static const char *scenario_names(char *room)
 {
@@ -214,6 +236,27 @@ static bool apply_option(cli_t *cli, option_id_t id, const char *text, failure_t
     }
 }
 
+/* "--key value" of a setting of the scenario before it is "--set key=value". */
+static bool is_setting(const cli_t *cli, const char *text)
+{
+    for (size_t i = 0u; cli->scenario != NULL && i < cli->scenario->settings_count; i++) {
+        if (strncmp(text, "--", 2u) == 0 && strcmp(text + 2, cli->scenario->settings[i].key) == 0) {
+            return true;
+        }
+    }
+    return false;
+}
+
+static bool spell_setting(cli_t *cli, const char *text, const char *value, failure_t *failure)
+{
+    char *room = cli->spelled[cli->sets < CLI_SETS_MAX ? cli->sets : 0u];
+
+    if ((size_t)snprintf(room, CLI_SPELLED_MAX, "%s=%s", text + 2, value) >= CLI_SPELLED_MAX) {
+        return fail(failure, EXIT_USAGE, "%s: the value is too long", text);
+    }
+    return add_setting(cli, room, failure);
+}
+
 static bool find_option(const char *text, option_id_t *id, failure_t *failure)
 {
     char names[LIST_MAX] = "";
@@ -293,10 +336,26 @@ static bool check_scopes(const cli_t *cli, const bool *given, failure_t *failure
     return true;
 }
 
+/* An option and the value behind it; null: none is there. */
+static bool take_option(cli_t *cli, const char *word, const char *value, bool *given, failure_t *failure)
+{
+    option_id_t id = OPTION_SET;
+    const bool setting = is_setting(cli, word);
+
+    if (!setting && !find_option(word, &id, failure)) {
+        return false;
+    }
+    if (value == NULL || strncmp(value, "--", 2) == 0) {
+        return fail(failure, EXIT_USAGE, "%s needs a value: %s %s", word, word,
+                    setting ? "VALUE" : options[id].argument);
+    }
+    given[id] = true;
+    return setting ? spell_setting(cli, word, value, failure) : apply_option(cli, id, value, failure);
+}
+
 bool cli_parse(int argc, char **argv, cli_t *cli, failure_t *failure)
 {
     bool given[OPTIONS] = {false};
-    option_id_t id = OPTION_FILTER;
 
     set_defaults(cli);
     for (int i = 1; i < argc; i++) {
@@ -311,16 +370,10 @@ bool cli_parse(int argc, char **argv, cli_t *cli, failure_t *failure)
             }
             continue;
         }
-        if (!find_option(word, &id, failure)) {
+        if (!take_option(cli, word, i + 1 < argc ? argv[i + 1] : NULL, given, failure)) {
             return false;
         }
-        if (i + 1 == argc || strncmp(argv[i + 1], "--", 2) == 0) {
-            return fail(failure, EXIT_USAGE, "%s needs a value: %s %s", word, word, options[id].argument);
-        }
-        if (!apply_option(cli, id, argv[++i], failure)) {
-            return false;
-        }
-        given[id] = true;
+        i++;
     }
     if (cli->command == COMMAND_LIST && argc > 2) {
         return fail(failure, EXIT_USAGE, "'list' stands alone: tools/run list");
@@ -366,7 +419,9 @@ static bool check_choice(const setting_t *setting, const char *value, failure_t 
     char room[LIST_MAX];
     char numbers[64] = "";
 
-    if (strchr(value, '#') == NULL && (is_choice(setting->choices, value) || is_choice_of_numbers(setting, value))) {
+    if (strchr(value, '#') == NULL && strcmp(value, "...") != 0 &&
+        (is_choice(setting->choices, value) || is_list_of_choices(setting->choices, value) ||
+         is_choice_of_numbers(setting, value))) {
         return true;
     }
     if (strchr(setting->choices, '#') != NULL) {
@@ -453,7 +508,7 @@ void cli_help(text_t *text)
 {
     text_add(text, "usage: tools/run [OPTION...]           all scenarios, with a report in out/\n"
                    "       tools/run list                  the scenarios, their filters and settings\n"
-                   "       tools/run SCENARIO [OPTION...]  one scenario\n"
+                   "       tools/run SCENARIO [OPTION...]  one scenario; --key value sets a setting too\n"
                    "       tools/run compare A.json B.json two results: deltas, and are they beyond chance?\n\n");
     for (unsigned i = 0u; i < OPTIONS; i++) {
         char left[64];

@@ -5,6 +5,7 @@
 #include "scenario.h"
 
 #define CLI_SETS_MAX 64
+#define CLI_SPELLED_MAX 128
 
 typedef enum { COMMAND_ALL, COMMAND_ONE, COMMAND_LIST, COMMAND_HELP } command_t;
 
@@ -21,11 +22,12 @@ typedef struct {
     const char *data; /* never null */
     const char *json;
     const char *csv;
-    const char *out;               /* folder for the files of all scenarios; never null */
-    const char *trace;             /* replay one run into this file, instead of all else */
-    const char *cloud;             /* and its particles into this one */
-    uint32_t trace_run;            /* the run */
-    const char *set[CLI_SETS_MAX]; /* "key=value" */
+    const char *out;                             /* folder for the files of all scenarios; never null */
+    const char *trace;                           /* replay one run into this file, instead of all else */
+    const char *cloud;                           /* and its particles into this one */
+    uint32_t trace_run;                          /* the run */
+    const char *set[CLI_SETS_MAX];               /* "key=value" */
+    char spelled[CLI_SETS_MAX][CLI_SPELLED_MAX]; /* room for those that stood as "--key value" */
     size_t sets;
 } cli_t;
 

@@ -7,6 +7,7 @@
 #include "land_vehicle.h"
 #include "manoeuvre.h"
 #include "sharp.h"
+#include "replay.h"
 #include "standoff.h"
 #include "terrain.h"
 #include "uav_trajectory.h"
@@ -22,6 +23,7 @@ const scenario_t *const all_scenarios[] = {&land_vehicle_scenario,   &uwb_range_
                                            &uav_trajectory_scenario, &gps_scenario,       &wind_scenario,
                                            &gps_fault_scenario,      &car_scenario,       &terrain_scenario,
                                            &sharp_scenario,          &manoeuvre_scenario};
+                                           &gps_fault_scenario,      &terrain_scenario,   &replay_scenario};
 const size_t all_scenarios_count = sizeof all_scenarios / sizeof all_scenarios[0];
 
 const scenario_t *scenario_find(const char *name)

@@ -21,6 +21,8 @@ typedef struct scenario scenario_t;
 typedef struct {
     const char *key;
     const char *choices; /* legal values with | between them, where # stands for a number in lo .. hi ("auto|#,#");
+                            a last choice "..." allows several of them, with commas;
+                            and a last choice "..." allows several of them, with commas;
                             null: a number in lo .. hi */
     double lo, hi;
     const char *fallback; /* the value without --set */

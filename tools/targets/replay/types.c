@@ -48,6 +48,12 @@ static const field_t autopilot_input_fields[] = {
 static const field_t coast_fields[] = {HALF(pfl_coast_t, axes), HALF(pfl_coast_t, remember)};
 static const field_t turn_fields[] = {ALL_WORDS(pfl_turn_t)};
 
+static const field_t hover_fields[] = {
+    HALF(pfl_hover_t, axes),
+    HALF(pfl_hover_t, biases),
+    WORDS_FROM(pfl_hover_t, time_s, bias_walk[PFL_HOVER_BIASES_MAX - 1u]),
+};
+
 static const type_t land_vehicle = TYPE(land_vehicle_fields, pfl_land_vehicle_t);
 static const type_t land_input = TYPE(land_input_fields, pfl_land_input_t);
 static const type_t constant_velocity = TYPE(constant_velocity_fields, pfl_constant_velocity_t);
@@ -59,6 +65,7 @@ static const type_t autopilot = TYPE(autopilot_fields, pfl_autopilot_t);
 static const type_t autopilot_input = TYPE(autopilot_input_fields, pfl_autopilot_input_t);
 static const type_t coast = TYPE(coast_fields, pfl_coast_t);
 static const type_t turn = TYPE(turn_fields, pfl_turn_t);
+static const type_t hover = TYPE(hover_fields, pfl_hover_t);
 
 const tape_model_t tape_models[] = {
     {NULL, NULL, NULL},
@@ -71,6 +78,7 @@ const tape_model_t tape_models[] = {
     {pfl_autopilot_predict, &autopilot, &autopilot_input},
     {pfl_coast_predict, &coast, NULL},
     {pfl_turn_predict, &turn, NULL},
+    {pfl_hover_predict, &hover, NULL},
 };
 const uint32_t tape_models_count = COUNT(tape_models);
 
@@ -107,6 +115,13 @@ static const field_t velocity_fields[] = {
 };
 static const field_t pair_fields[] = {{0u, (uint8_t)FIELD_WORD, 2u}};
 
+static const field_t biased_fields[] = {
+    HALF(pfl_biased_t, count),
+    HALF(pfl_biased_t, state),
+    HALF(pfl_biased_t, bias),
+    INV_SIGMA(pfl_biased_t, inv_sigma),
+};
+
 static const type_t position = TYPE(position_fields, pfl_position_t);
 static const type_t range = TYPE(range_fields, pfl_range_t);
 static const type_t range_z = TYPE(range_z_fields, pfl_range_z_t);
@@ -115,6 +130,7 @@ static const type_t range_bearing_z = TYPE(range_bearing_z_fields, pfl_range_bea
 static const type_t coloured = TYPE(coloured_fields, pfl_coloured_t);
 static const type_t coloured_z = TYPE(coloured_z_fields, pfl_coloured_z_t);
 static const type_t velocity = TYPE(velocity_fields, pfl_velocity_t);
+static const type_t biased = TYPE(biased_fields, pfl_biased_t);
 static const type_t pair = TYPE(pair_fields, float[2]);
 
 const tape_sensor_t tape_sensors[] = {
@@ -125,6 +141,7 @@ const tape_sensor_t tape_sensors[] = {
     {pfl_range_bearing_loglik, &range_bearing, &range_bearing_z},
     {pfl_coloured_loglik, &coloured, &coloured_z},
     {pfl_velocity_loglik, &velocity, &pair},
+    {pfl_biased_loglik, &biased, NULL},
 };
 const uint32_t tape_sensors_count = COUNT(tape_sensors);
 
