@@ -22,8 +22,7 @@
 const scenario_t *const all_scenarios[] = {&land_vehicle_scenario,   &uwb_range_scenario, &standoff_scenario,
                                            &uav_trajectory_scenario, &gps_scenario,       &wind_scenario,
                                            &gps_fault_scenario,      &car_scenario,       &terrain_scenario,
-                                           &sharp_scenario,          &manoeuvre_scenario};
-                                           &gps_fault_scenario,      &terrain_scenario,   &replay_scenario};
+                                           &sharp_scenario,          &manoeuvre_scenario, &replay_scenario};
 const size_t all_scenarios_count = sizeof all_scenarios / sizeof all_scenarios[0];
 
 const scenario_t *scenario_find(const char *name)
