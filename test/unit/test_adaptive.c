@@ -153,6 +153,9 @@ void test_nothing_tells_the_difference(void)
         for (uint32_t step = 1u; step < 6u; step++) {
             hash = ut_fly_linear(f, step * 1000u, 0.5f, hash);
             TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_set_particles(f, &adaptive, counts[(k + step) % 3u]));
+            pfl_sensor_health_t tracked;
+            TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_sensor_health(f, 0u, &tracked));
+            TEST_ASSERT_TRUE(tracked.t_fused_us == step * 1000u && tracked.refused == 0u && tracked.same == 0u);
         }
         TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_set_particles(f, &adaptive, counts[k]));
         pfl_config_t config = adaptive.config;
@@ -345,6 +348,13 @@ void test_the_budget_holds(void)
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_health(f, &later));
     TEST_ASSERT_TRUE(later.overruns <= 1u);
     TEST_ASSERT_TRUE(adaptive.config.particles > 200u && adaptive.config.particles < 320u);
+    price = 100u; /* and back */
+    for (uint32_t step = 601u; step <= 1000u; step++) {
+        const float z = (float)ut_gaussian(&dice);
+        (void)ut_fly_linear(f, step * 100000u, z, 0u);
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_adapt(f, &adaptive));
+    }
+    TEST_ASSERT_TRUE(adaptive.config.particles > 450u && adaptive.config.particles < 600u);
 }
 
 /* ---- A tempered update whose budget ends ------------------------------------------------------------------------------ */
