@@ -4,6 +4,8 @@
 
 #include "pflight/adaptive.h"
 #include "pflight/port.h"
+#include "pflight/regularised.h"
+#include "pflight/tempered.h"
 
 #include "unity.h"
 
@@ -151,6 +153,9 @@ void test_nothing_tells_the_difference(void)
         for (uint32_t step = 1u; step < 6u; step++) {
             hash = ut_fly_linear(f, step * 1000u, 0.5f, hash);
             TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_set_particles(f, &adaptive, counts[(k + step) % 3u]));
+            pfl_sensor_health_t tracked;
+            TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_sensor_health(f, 0u, &tracked));
+            TEST_ASSERT_TRUE(tracked.t_fused_us == step * 1000u && tracked.refused == 0u && tracked.same == 0u);
         }
         TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_set_particles(f, &adaptive, counts[k]));
         pfl_config_t config = adaptive.config;
@@ -343,6 +348,82 @@ void test_the_budget_holds(void)
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_health(f, &later));
     TEST_ASSERT_TRUE(later.overruns <= 1u);
     TEST_ASSERT_TRUE(adaptive.config.particles > 200u && adaptive.config.particles < 320u);
+    price = 100u; /* and back */
+    for (uint32_t step = 601u; step <= 1000u; step++) {
+        const float z = (float)ut_gaussian(&dice);
+        (void)ut_fly_linear(f, step * 100000u, z, 0u);
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_adapt(f, &adaptive));
+    }
+    TEST_ASSERT_TRUE(adaptive.config.particles > 450u && adaptive.config.particles < 600u);
+}
+
+/* ---- A tempered update whose budget ends ------------------------------------------------------------------------------ */
+
+static void sharp_loglik(void *user, const void *z, const pfl_view_t *p, float *ll)
+{
+    cycles += price * p->n;
+    for (uint32_t i = 0u; i < p->n; i++) {
+        const float e = (p->x[i] - *(const float *)z) * 20.0f;
+        ll[i] = -0.5f * (e * e);
+    }
+    (void)user;
+}
+
+/* Wherever the budget ends: either nothing is fused, or all of the measurement. Where no resampling came in between, the
+ * weights say so: they are those of the whole likelihood. Returns the steps taken. */
+static uint32_t check_budget(uint32_t budget_cycles, uint32_t *deferred)
+{
+    static const pfl_kernel_t kernel = {0.5f, 0u, pfl_kernel_move};
+    pfl_tempered_t tempered = {.loglik = sharp_loglik, .ess_share = 0.5f, .steps = 8u};
+    const pfl_sensor_t sharp = {.loglik = pfl_tempered_loglik, .user = &tempered};
+    pfl_config_t config = ut_linear_config(300u);
+    const float z = 2.0f;
+    float weights[300];
+    pfl_view_t view;
+    pfl_health_t health;
+    config.sensors = &sharp;
+    config.kernel = &kernel;
+    config.predict = linear_predict;
+    config.budget_cycles = budget_cycles;
+    pfl_t *f = ut_filter(&config);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_predict(f, 1000u, NULL));
+    const pfl_status_t status = pfl_tempered_update(f, 0u, 1000u, &z);
+    TEST_ASSERT_TRUE(status == PFL_OK || status == PFL_DEFERRED || status == PFL_ERR_BUDGET);
+    TEST_ASSERT_TRUE(pfl_invariants_hold(f));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_health(f, &health));
+    TEST_ASSERT_EQUAL_UINT32((status >= PFL_OK) ? 1u : 0u, health.fused);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_particles(f, &view, weights));
+    if (status == PFL_DEFERRED && health.resampled == 0u) {
+        float best = -1e30f;
+        for (uint32_t i = 0u; i < 300u; i++) {
+            const float e = (view.x[i] - z) * 20.0f;
+            best = (-0.5f * e * e > best) ? (-0.5f * e * e) : best;
+        }
+        for (uint32_t i = 0u; i < 300u; i++) {
+            const float e = (view.x[i] - z) * 20.0f;
+            TEST_ASSERT_FLOAT_WITHIN(0.01f, (-0.5f * e * e) - best, weights[i]);
+        }
+    }
+    *deferred += (status == PFL_DEFERRED) ? 1u : 0u;
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_predict(f, 2000u, NULL)); /* what was put off is done */
+    TEST_ASSERT_TRUE(pfl_invariants_hold(f));
+    ut_arenas_end();
+    return tempered.taken;
+}
+
+void test_a_tempered_update_ends_with_its_budget(void)
+{
+    uint32_t deferred = 0u;
+    uint32_t most = 0u;
+    uint32_t fewest = 99u;
+    for (uint32_t budget_cycles = 20000u; budget_cycles < 300000u; budget_cycles += 1500u) {
+        const uint32_t taken = check_budget(budget_cycles, &deferred);
+        most = (taken > most) ? taken : most;
+        fewest = (taken < fewest) ? taken : fewest;
+    }
+    TEST_ASSERT_EQUAL_UINT32(0u, fewest);
+    TEST_ASSERT_TRUE(most > 2u);
+    TEST_ASSERT_TRUE(deferred > 2u);
 }
 
 /* ---- Wrong calls ------------------------------------------------------------------------------------------------------- */

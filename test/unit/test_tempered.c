@@ -144,6 +144,29 @@ void test_where_one_step_is_enough_the_bits_are_those_of_an_update(void)
     }
 }
 
+/* What the cloud already weighs counts: a measurement that evens out the one before needs no steps. */
+void test_the_weights_before_count(void)
+{
+    float one[300];
+    float other[300];
+    pfl_config_t config = config_of(300u, &sharp);
+    tempered.loglik = ut_dictated_loglik;
+    sensors[1].loglik = ut_dictated_loglik;
+    config.ess_ratio = 0.0f;
+    for (uint32_t i = 0u; i < 300u; i++) {
+        one[i] = -0.1f * (float)(int32_t)i;
+        other[i] = -0.1f * (float)(int32_t)(299u - i);
+    }
+    pfl_t *f = ut_filter(&config);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_update(f, 1u, 0u, one));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_tempered_update(f, 0u, 0u, other));
+    TEST_ASSERT_EQUAL_UINT32(1u, tempered.taken);
+    TEST_ASSERT_FLOAT_WITHIN(0.1f, 300.0f, pfl_effective_sample_size(f));
+    f = ut_filter(&config);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_tempered_update(f, 0u, 0u, other));
+    TEST_ASSERT_TRUE(tempered.taken > 1u);
+}
+
 void test_the_sensor_is_asked_once_a_step(void)
 {
     const float z = 2.5f;
