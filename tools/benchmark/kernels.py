@@ -33,7 +33,7 @@ CAN_VECTORISE = {
     "coast": 3.0, "turn": 4.0, "turn_redraw": 3.0,
     "position": 3.0, "position_one": 3.0, "position_distance": 4.0, "range": 3.0, "range_student": 4.0, "range_bearing": 4.0,
     "coloured": 3.0, "velocity": 4.0, "dead_reckoning_rest": 2.0, "marginal_shared": 2.0, "marginal_shared_seen": 2.0,
-    "marginal_each_seen": 2.0, "terrain": 1.5,
+    "marginal_each_seen": 1.8, "terrain": 1.5,
     "one_constant_velocity": 3.0, "one_position": 3.0, "mean": 3.0, "mean_covariance": 3.0, "mean_circular": 3.0,
 }
 # autopilot_route looks up each particle's waypoint; one_land_vehicle calls a function for each; the eight streams alone are

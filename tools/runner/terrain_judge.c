@@ -20,39 +20,36 @@ static double largest(table_t runs, size_t column)
     return most;
 }
 
-static void accept(metric_t *metric, double lo, double hi)
+static void accept(metric_t *metric, bool judged, double lo, double hi)
 {
-    metric->lo = lo;
-    metric->hi = hi;
+    if (judged) {
+        metric->lo = lo;
+        metric->hi = hi;
+    }
 }
 
 void terrain_judge(const plan_t *plan, table_t runs, verdict_t *verdict)
 {
     const terrain_study_t *s = plan->own;
     const uint32_t most = s->filter == TERRAIN_RB ? MARGINAL_PARTICLES : OTHER_PARTICLES;
-    const bool judged = s->as_they_come && s->filter != TERRAIN_PLAIN && s->particles <= most;
-    const bool many = runs.n >= SEEDS_FOR_MEDIAN;
+    const bool enough = s->adaptive ? s->particles == OTHER_PARTICLES : s->particles <= most;
+    const bool judged = s->as_they_come && s->filter != TERRAIN_PLAIN && enough && runs.n >= SEEDS_FOR_MEDIAN;
     const figure_t worst = {largest(runs, TERRAIN_WORST), (double)NAN};
-    metric_t *converged = verdict_add(verdict, "converged_share", stats_mean(runs, TERRAIN_CONVERGED));
 
-    if (judged && many) {
-        accept(converged, 1.0, 1.0);
-    }
-    metric_t *rmse = verdict_add(verdict, "rmse_after_200s_m_median", stats_median(runs, TERRAIN_RMSE));
-    if (judged && many) {
-        accept(rmse, 0.0, s->second ? 17.0 : 15.0);
-    }
+    accept(verdict_add(verdict, "converged_share", stats_mean(runs, TERRAIN_CONVERGED)), judged, 1.0, 1.0);
+    accept(verdict_add(verdict, "rmse_after_200s_m_median", stats_median(runs, TERRAIN_RMSE)), judged, 0.0,
+           s->second ? 17.0 : 15.0);
     verdict_add(verdict, "error_after_200s_m_worst", worst);
     verdict_add(verdict, "settled_s_median", stats_median(runs, TERRAIN_SETTLED_S));
-    metric_t *mean = verdict_add(verdict, "particles_after_200s_mean", stats_mean(runs, TERRAIN_PARTICLES));
-    if (judged && s->adaptive && many) {
-        accept(mean, 0.0, (double)OTHER_PARTICLES / ADAPTIVE_SAVES);
-    }
+    accept(verdict_add(verdict, "particles_after_200s_mean", stats_mean(runs, TERRAIN_PARTICLES)),
+           judged && s->adaptive, 0.0, (double)s->particles / ADAPTIVE_SAVES);
     verdict_add(verdict, "resampled_share", stats_mean(runs, TERRAIN_RESAMPLED));
     text_add(&verdict->notes,
              "The heights are real, the flight is simulated. Converged: within 60 m from t = 200 s to the "
              "end. settled_s: since when, or the end of the flight.\n");
     if (s->filter == TERRAIN_PLAIN) {
-        text_add(&verdict->notes, "The plain filter is not judged: it is what the others are compared with.\n");
+        text_add(&verdict->notes,
+                 "The plain filter is not judged: it is what the others are compared with. It takes the "
+                 "whole likelihood from the start, whatever power says, and has no kernel step.\n");
     }
 }
