@@ -87,7 +87,7 @@ typedef struct {
  * When the pfl_predict fails or is a no-op, put the structure back as it was. O(linear^3). */
 void pfl_marginal_shared_step(pfl_marginal_shared_t *s, bool measured);
 
-/* user: pfl_marginal_shared_t, u: pfl_marginal_input_t. O(n linear (driven + linear + measured)). */
+/* user: pfl_marginal_shared_t, u: pfl_marginal_input_t. O(n linear (driven + linear + measured)). Stack: about 550 B. */
 void pfl_marginal_shared_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p);
 
 /* ---- A covariance for each particle ------------------------------------------------------------------------------ */
@@ -103,7 +103,8 @@ typedef struct {
     float *work;                       /* PFL_MARGINAL_WORK(linear, driven), the caller's, for one filter at a time */
 } pfl_marginal_each_t;
 
-/* user: pfl_marginal_each_t, u: pfl_marginal_input_t. O(n linear^2 (linear + driven + measured)). */
+/* user: pfl_marginal_each_t, u: pfl_marginal_input_t. O(n linear^2 (linear + driven + measured)). Stack: about
+ * 400 B. */
 void pfl_marginal_each_predict(void *user, const void *u, float dt_s, const pfl_batch_t *p);
 
 #ifdef __cplusplus
