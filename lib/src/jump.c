@@ -273,9 +273,9 @@ pfl_status_t pfl_jump_probabilities(pfl_t *f, const pfl_jump_t *m, float *probab
         return entered;
     }
     share_t shares[PFL_REGIMES_MAX];
-    const float total = (float)weigh(f, m, shares);
+    const uint32_t total = weigh(f, m, shares);
     for (uint32_t r = 0u; r < m->regimes; r++) {
-        probability[r] = (float)shares[r].sum / total;
+        probability[r] = (float)shares[r].sum / (float)total;
     }
     return pfl_end(f, PFL_OK);
 }

@@ -19,7 +19,7 @@
 extern "C" {
 #endif
 
-#define PFL_BINS_DIMENSIONS 4u
+#define PFL_BINS_DIMENSIONS 4u /* states that span the grid, at most */
 
 /* One filter's alone. Zeroed fields mean what their comments say. */
 typedef struct {

@@ -14,6 +14,7 @@ extern "C" {
 #define PFL_ANTITHETIC_NOISES(q) (((q) + 1u) / 2u)
 #define PFL_ANTITHETIC_MAX 4u /* noises of the model */
 
+/* A model under antithetic noise. */
 typedef struct {
     pfl_predict_fn predict; /* the model, not null */
     void *user;             /* handed to predict */

@@ -16,6 +16,7 @@
 extern "C" {
 #endif
 
+/* How to look. */
 typedef struct {
     pfl_loglik_fn loglik; /* not null: the sensor, looking at particles that were moved without noise: its own deviation
                              must be the root of sensor's and model's variances. Too sharp, and luck decides again */

@@ -34,6 +34,7 @@ extern "C" {
 
 /* ---- Memory ------------------------------------------------------------------------------------------------- */
 
+/* Parts of PFL_ARENA_BYTES. */
 #define PFL_CEIL8(n) ((((size_t)(n)) + 7u) & ~(size_t)7u)
 #define PFL_MAX(a, b) (((a) > (b)) ? (a) : (b))
 #define PFL_CONTROL_BYTES 1088u /* room for the control block and its copy, checked when the library is compiled */
@@ -76,6 +77,7 @@ typedef struct {
     uint32_t n;
 } pfl_view_t;
 
+/* Column d of a batch or view; noise column q of a batch. */
 #define PFL_STATE(batch, d) ((batch)->x + ((size_t)(d) * (batch)->stride))
 #define PFL_NOISE(batch, q) ((batch)->noise + ((size_t)(q)*PFL_BATCH))
 
@@ -156,6 +158,7 @@ typedef struct {
 void pfl_constraint_keep(pfl_t *f, const void *u, float dt_s, uint32_t first, uint32_t n);
 
 #define PFL_TRIES_MAX 256u
+/* More arena for a constraint with tries > 1. */
 #define PFL_RETRY_BYTES(d) (8u * (size_t)PFL_BATCH * (size_t)(d))
 
 /* After each resampling, moves the copies apart without changing mean and covariance of the cloud (West 1993; Liu and
@@ -191,6 +194,7 @@ typedef struct {
 /* What does it. Not to be called, but to be named in pfl_watch_t.keep, as above. */
 pfl_status_t pfl_watch_keep(pfl_t *f, uint32_t what, uint32_t number, const void *z);
 
+/* More arena for a watch. */
 #define PFL_WATCH_BYTES(sensors) (32u * (size_t)(sensors))
 
 /* What is worth choosing, measured: docs/tuning.md. An ess_ratio of 0.5 is best or near it nearly everywhere;

@@ -108,6 +108,7 @@ typedef struct {
     uint32_t phase_form;        /* pfl_phase_form_t */
 } pfl_nmpc_t;
 
+/* Commands of the steps ahead. */
 typedef struct {
     float speed_mps[PFL_NMPC_STEPS];
     float turn_radps[PFL_NMPC_STEPS];
@@ -119,6 +120,7 @@ typedef struct {
     float y_m[PFL_NMPC_STEPS + 1u];
 } pfl_nmpc_path_t;
 
+/* What to solve. */
 typedef struct {
     pfl_uav_t uav;
     const pfl_nmpc_path_t *target;
@@ -131,6 +133,7 @@ typedef struct {
     float numbers[(16u * PFL_NMPC_STEPS) + 8u];
 } pfl_nmpc_work_t;
 
+/* What came of it. */
 typedef struct {
     float cost;
     uint32_t evaluations; /* predictions made, at most PFL_NMPC_EVALUATIONS_MAX */

@@ -21,6 +21,7 @@
 extern "C" {
 #endif
 
+/* The phases, as told above. */
 typedef enum {
     PFL_PHASE_INIT = 0,
     PFL_PHASE_CONVERGING = 1,

@@ -13,14 +13,17 @@
 extern "C" {
 #endif
 
-#define PFL_REGIMES_MAX 4u
+#define PFL_REGIMES_MAX 4u /* regimes of one filter */
+/* Floats of pfl_jump_t.room for d states and q noises. */
 #define PFL_JUMP_FLOATS(d, q) ((size_t)PFL_BATCH * ((size_t)(d) + (size_t)(q)))
 
+/* One regime: a model. */
 typedef struct {
     pfl_predict_fn predict; /* not null; may not change the regime's number */
     void *user;             /* handed to predict */
 } pfl_regime_t;
 
+/* All of them, and how they change. */
 typedef struct {
     uint32_t regimes;                                /* 1 .. PFL_REGIMES_MAX */
     pfl_regime_t regime[PFL_REGIMES_MAX];            /* the models, of D states and Q noises */

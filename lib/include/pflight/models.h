@@ -68,6 +68,7 @@ typedef struct {
     float sigma_position; /* random walk of each position [m/sqrt(s)] */
 } pfl_odometry_t;
 
+/* u of the unicycle, measured. */
 typedef struct {
     float speed_mps;
     float turn_radps; /* from x to y positive */

@@ -10,7 +10,7 @@
 extern "C" {
 #endif
 
-#define PFL_RNG_LANES 8u
+#define PFL_RNG_LANES 8u /* streams side by side */
 
 /* Word k of lane l is s[k][l]. The ninth stream `one` serves single draws. The caller owns it; copy it to fork. */
 typedef struct {

@@ -33,6 +33,7 @@ typedef struct {
     float dof;                 /* degrees of freedom of Student's t: 1 .. 5 heavy tails; 0: Gaussian */
 } pfl_range_t;
 
+/* A measurement. */
 typedef struct {
     float anchor_x_m, anchor_y_m;
     float height_m; /* of the anchor over the particle's plane, or under it */
@@ -50,6 +51,7 @@ typedef struct {
     float inv_sigma_bearing; /* [1/rad] */
 } pfl_range_bearing_t;
 
+/* A measurement. */
 typedef struct {
     float from_x_m, from_y_m; /* where the sensor was */
     float range_m;
@@ -94,7 +96,7 @@ void pfl_velocity_loglik(void *user, const void *z, const pfl_view_t *p, float *
 
 /* ---- States seen directly, some through a bias that the filter estimates ------------------------------------------ */
 #define PFL_BIASED_MAX 6u
-#define PFL_UNBIASED 0xFFFFu
+#define PFL_UNBIASED 0xFFFFu /* in pfl_biased_t.bias */
 
 typedef struct {
     uint16_t count;                  /* components, 1 .. PFL_BIASED_MAX */

@@ -17,7 +17,7 @@
 extern "C" {
 #endif
 
-#define PFL_TEMPERED_STEPS_MAX 16u
+#define PFL_TEMPERED_STEPS_MAX 16u /* steps of one measurement */
 
 /* In memory that can be written; one filter's alone. */
 typedef struct {

@@ -33,8 +33,9 @@ typedef struct {
     float gross_span_m;               /* gross errors spread evenly over a range so wide; 0 with gross_share 0 */
 } pfl_terrain_t;
 
-#define PFL_TERRAIN_NO_BIAS 0xFFFFu
+#define PFL_TERRAIN_NO_BIAS 0xFFFFu /* for bias_state */
 
+/* A measurement. */
 typedef struct {
     float altitude_m; /* by the barometer */
     float agl_m;      /* above ground, by the altimeter */
@@ -61,6 +62,7 @@ enum {
     PFL_DR_STATES = 5
 };
 
+/* The model's parameters. */
 typedef struct {
     float sigma_velocity_mps; /* white, of one step */
     float bias_decay;         /* of the velocity's bias, in a step: e^(-dt / tau) */
@@ -68,6 +70,7 @@ typedef struct {
     float sigma_baro_m;       /* of the barometer's bias, in a step */
 } pfl_dead_reckoning_t;
 
+/* Its input: the velocity that is integrated. */
 typedef struct {
     float north_mps, east_mps;
 } pfl_dead_reckoning_input_t;

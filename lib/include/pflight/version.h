@@ -2,6 +2,7 @@
 #ifndef PFLIGHT_VERSION_H
 #define PFLIGHT_VERSION_H
 
+/* As one number to compare, and its parts. */
 #define PFL_VERSION_MAJOR 0
 #define PFL_VERSION_MINOR 1
 #define PFL_VERSION_PATCH 0

@@ -11,6 +11,7 @@
 extern "C" {
 #endif
 
+/* A place to fly to. */
 typedef struct {
     float x_m, y_m;
 } pfl_waypoint_t;

@@ -59,6 +59,7 @@ typedef struct {
     float widen; /* >= 1 widens sigma_velocity, in a sharp turn say; 1 for none */
 } pfl_wind_fix_t;
 
+/* What the wind and the air data do, and the covariance on its way. */
 typedef struct {
     float wind_walk;          /* [m/s/sqrt(s)] */
     float gust_sigma_mps;     /* on each axis */
@@ -75,8 +76,8 @@ typedef struct {
     /* Owned by the calls below. */
     float cov[PFL_WIND_COV];
     float gain_position[3]; /* of position, wind and gust by a fix's position and velocity */
-    float gain_velocity[3];
-    float inverse[3]; /* of the innovations' covariance: xx, xv, vv */
+    float gain_velocity[3]; /* likewise, by its velocity */
+    float inverse[3];       /* of the innovations' covariance: xx, xv, vv */
 } pfl_wind_t;
 
 /* Begins the shared covariance; before pfl_init. O(1). */
