@@ -62,6 +62,13 @@ static inline float pfl_log_positive_kernel(float x)
     return ((tail - (0.5f * t2)) + t) + (e * PFL_LN2_HI);
 }
 
+/* For log-likelihoods by the logarithm above, which makes a number of a NaN: one that is not finite in what was measured
+ * refuses the measurement by its first particle. */
+static inline void pfl_log_tells(float *ll, float measured)
+{
+    ll[0] += 0.0f * measured;
+}
+
 static inline float pfl_log_kernel(float x)
 {
     const int32_t i = pfl_bits(x);

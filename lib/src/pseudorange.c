@@ -158,6 +158,7 @@ static void add_mixture(const pfl_pseudorange_t *s, const pfl_satellite_t *satel
         const float density = direct_density(&m, e) + reflected_density(&m, e);
         out[i] += s->power * pfl_log_positive_kernel(density * inv_top);
     }
+    pfl_log_tells(out, (satellite->ux + satellite->uy) + satellite->range_m);
 }
 
 static void add_gaussian(const pfl_pseudorange_t *s, const pfl_satellite_t *satellite, const pfl_view_t *p, float *ll)

@@ -53,6 +53,7 @@ void pfl_range_bias_loglik(void *user, const void *z, const pfl_view_t *p, float
         const float e = (m.range_m - distance(x[i] - m.anchor_x_m, y[i] - m.anchor_y_m, height2)) - bias[i];
         out[i] = power * pfl_log_positive_kernel(1.0f + ((e * e) * scale));
     }
+    pfl_log_tells(out, (m.anchor_x_m + m.anchor_y_m) + (m.height_m + m.range_m));
 }
 
 void pfl_range_bias_fused(pfl_range_bias_t *s, const pfl_range_bias_z_t *z)

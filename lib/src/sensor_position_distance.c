@@ -23,4 +23,7 @@ void pfl_position_distance_loglik(void *user, const void *z, const pfl_view_t *p
     for (uint32_t i = 0u; i < p->n; i++) {
         out[i] = -pfl_log_positive_kernel(out[i]);
     }
+    for (uint32_t k = 0u; k < s->count; k++) {
+        pfl_log_tells(out, measured[k]);
+    }
 }

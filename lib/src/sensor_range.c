@@ -25,6 +25,7 @@ void pfl_range_loglik(void *user, const void *z, const pfl_view_t *p, float *ll)
         for (uint32_t i = 0u; i < p->n; i++) {
             out[i] = power * pfl_log_positive_kernel(1.0f + (out[i] * inv_dof));
         }
+        pfl_log_tells(out, ((m->anchor_x_m + m->anchor_y_m) + (m->height_m + m->range_m)) + inv_sigma);
     } else {
         for (uint32_t i = 0u; i < p->n; i++) {
             out[i] = -0.5f * out[i];

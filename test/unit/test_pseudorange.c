@@ -168,3 +168,20 @@ void test_wheels_follow_their_equations(void)
                                   (double)x[N + i]);
     }
 }
+
+void test_a_range_that_is_no_number_is_refused(void)
+{
+    const float bad[] = {NAN, -NAN, INFINITY, -INFINITY};
+    for (uint32_t k = 0u; k < 12u; k++) {
+        float ll[N];
+        uint32_t finite = 0u;
+        const float kept = ranges.satellite[k / 4u].range_m;
+        ranges.satellite[k / 4u].range_m = bad[k % 4u];
+        pfl_pseudorange_loglik(&sensor, &ranges, &view, ll);
+        ranges.satellite[k / 4u].range_m = kept;
+        for (uint32_t i = 0u; i < N; i++) {
+            finite += isfinite(ll[i]) ? 1u : 0u;
+        }
+        TEST_ASSERT_LESS_THAN_UINT32(N, finite);
+    }
+}

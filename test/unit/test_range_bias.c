@@ -96,3 +96,18 @@ void test_a_gross_range_hardly_pulls(void)
         TEST_ASSERT_FLOAT_WITHIN(0.02f, 0.1f, x[2u * N + i]);
     }
 }
+
+void test_a_range_that_is_no_number_is_refused(void)
+{
+    const float bad[] = {NAN, -NAN, INFINITY, -INFINITY};
+    for (uint32_t k = 0u; k < 4u; k++) {
+        const pfl_range_bias_z_t z = {1.0f, -2.0f, 0.5f, bad[k], 1u};
+        float ll[N];
+        uint32_t finite = 0u;
+        pfl_range_bias_loglik(&sensor, &z, &view, ll);
+        for (uint32_t i = 0u; i < N; i++) {
+            finite += isfinite(ll[i]) ? 1u : 0u;
+        }
+        TEST_ASSERT_LESS_THAN_UINT32(N, finite);
+    }
+}
