@@ -333,6 +333,9 @@ class Report(unittest.TestCase):
         "standoff": ["orbits-lvfg", "orbits-nmpc", "field", "position", "distance", "particles", "phase"],
         "gps": ["line", "line-error", "curve", "curve-error"],
         "terrain": ["error-1", "track-1", "error-2", "track-2"],
+        "wind": ["wind-px4", "offset-px4", "wind-x8", "offset-x8"],
+        "gps-fault": ["height", "flag"],
+        "car": ["track", "error"],
     }
 
     def test_page_is_sound_and_self_contained(self):
@@ -392,6 +395,11 @@ class Skipped(unittest.TestCase):
             self.assertIn(missing, skipped[0]["reason"])
             suites = xml.etree.ElementTree.parse(made / "junit.xml").getroot()
             self.assertEqual([entry["reason"] for entry in skipped], [case.get("message") for case in suites.iter("skipped")])
+            self.assertEqual(["uwb-range", "wind", "gps-fault", "car"], [entry["scenario"] for entry in skipped])
+            self.assertIn(missing, skipped[0]["reason"])
+            suites = xml.etree.ElementTree.parse(made / "junit.xml").getroot()
+            self.assertEqual([entry["reason"] for entry in skipped],
+                             [case.get("message") for case in suites.iter("skipped")])
             page = page_of(made / "report.html")
             self.assertEqual(([], []), (page.problems, page.open))
             self.assertIn("uwb-range", page.ids)

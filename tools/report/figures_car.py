@@ -4,7 +4,7 @@ from topics import Figure, Topic
 
 SCENARIO = "car"
 FILTERS = {"mixture": ("one-sided mixture", style.OURS), "gaussian": ("Gaussian", style.OTHER),
-           "odometry": ("odometry alone, from the true start", style.THIRD)}
+           "odometry": ("odometry alone", style.THIRD)}
 
 
 def draw_track(results):
@@ -32,7 +32,8 @@ def draw_error(results):
 
 TOPICS = (
     Topic("car", "Street canyon",
-          (Figure("car-track", "Drive in a street canyon: track", "Mean over the runs.", draw_track),
+          (Figure("car-track", "Drive in a street canyon: track",
+                  "Mean over the runs; odometry begins at the true start, the others at the first fix.", draw_track),
            Figure("car-error", "Drive in a street canyon: error over time", "Mean over the runs.", draw_error)),
           lambda study: True),
 )
