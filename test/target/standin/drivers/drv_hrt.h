@@ -5,6 +5,10 @@
 #include <stdint.h>
 
 typedef uint64_t hrt_abstime;
-hrt_abstime hrt_absolute_time(void);
+#ifdef __cplusplus
+extern "C"
+#endif
+    hrt_abstime
+    hrt_absolute_time(void);
 
 #endif
