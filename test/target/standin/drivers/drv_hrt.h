@@ -6,9 +6,13 @@
 
 typedef uint64_t hrt_abstime;
 #ifdef __cplusplus
-extern "C"
+extern "C" {
 #endif
-    hrt_abstime
-    hrt_absolute_time(void);
+
+hrt_abstime hrt_absolute_time(void);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif
