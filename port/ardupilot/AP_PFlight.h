@@ -4,18 +4,27 @@
 #include "pflight.h"
 
 class AP_PFlight {
-public:
+  public:
     /* False where this build does not keep the bits, or the configuration is refused: status() tells. */
     bool init(uint64_t now_us);
 
     /* A height and its time, at the rate of the barometer. False: not fused. */
     bool update(uint64_t now_us, float height_m);
 
-    float height_m() const { return mean[0]; }
-    float climb_mps() const { return mean[1]; }
-    pfl_status_t status() const { return last; }
+    float height_m() const
+    {
+        return mean[0];
+    }
+    float climb_mps() const
+    {
+        return mean[1];
+    }
+    pfl_status_t status() const
+    {
+        return last;
+    }
 
-private:
+  private:
     static const uint16_t particles = 200;
 
     static void climb(void *user, const void *u, float dt_s, const pfl_batch_t *p);
@@ -25,9 +34,9 @@ private:
         uint64_t align;
         uint8_t bytes[PFL_ARENA_BYTES(particles, 2, 1)];
     } arena;
-    pfl_config_t config {};
-    pfl_sensor_t sensor {};
+    pfl_config_t config{};
+    pfl_sensor_t sensor{};
     pfl_t *filter = nullptr;
     pfl_status_t last = PFL_ERR_ARG;
-    float mean[2] {};
+    float mean[2]{};
 };

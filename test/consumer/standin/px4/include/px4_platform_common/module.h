@@ -13,24 +13,40 @@
 #define PRINT_MODULE_USAGE_COMMAND(name) standin_say(name)
 #define PRINT_MODULE_USAGE_DEFAULT_COMMANDS() standin_say("stop, status")
 
-inline void standin_say(const char *, ...) {}
+inline void standin_say(const char *, ...)
+{
+}
 
 template <class T> struct StandinPointer {
     T *pointer = nullptr;
-    void store(T *to) { pointer = to; }
+    void store(T *to)
+    {
+        pointer = to;
+    }
 };
 
 static constexpr int task_id_is_work_queue = -2;
 
 template <class T> class ModuleBase {
-public:
+  public:
     virtual ~ModuleBase() = default;
-    virtual int print_status() { return 0; }
-    static int main(int argc, char *argv[]) { return T::task_spawn(argc - 1, argv + 1); }
-    bool should_exit() const { return false; }
-    void exit_and_cleanup() {}
+    virtual int print_status()
+    {
+        return 0;
+    }
+    static int main(int argc, char *argv[])
+    {
+        return T::task_spawn(argc - 1, argv + 1);
+    }
+    bool should_exit() const
+    {
+        return false;
+    }
+    void exit_and_cleanup()
+    {
+    }
 
-protected:
+  protected:
     static StandinPointer<T> _object;
     static int _task_id;
 };
