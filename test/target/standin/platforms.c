@@ -1,7 +1,10 @@
 /* What stands behind the stand-in headers: one counter, moved by the test, that every platform answers with. */
 #include "platforms.h"
 
+#include <Arduino.h>
 #include <drivers/drv_hrt.h>
+#include <esp_cpu.h>
+#include <esp_rom_sys.h>
 #include <nuttx/clock.h>
 #include <task.h>
 #include <zephyr/kernel.h>
@@ -48,4 +51,19 @@ unsigned long perf_getfreq(void)
 uint64_t standin_micros64(void)
 {
     return next();
+}
+
+esp_cpu_cycle_count_t esp_cpu_get_cycle_count(void)
+{
+    return (uint32_t)next();
+}
+
+uint32_t esp_rom_get_cpu_ticks_per_us(void)
+{
+    return 240u;
+}
+
+unsigned long micros(void)
+{
+    return (uint32_t)next(); /* 32 bits wide, as on every board */
 }

@@ -5,6 +5,14 @@
 #include <stdint.h>
 
 typedef uint64_t hrt_abstime;
+#ifdef __cplusplus
+extern "C" {
+#endif
+
 hrt_abstime hrt_absolute_time(void);
+
+#ifdef __cplusplus
+}
+#endif
 
 #endif
