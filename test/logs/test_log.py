@@ -139,9 +139,9 @@ class Replay(unittest.TestCase):
     def setUpClass(cls):
         cls.folder = pathlib.Path(tempfile.mkdtemp(prefix="pflight-replay-"))
         tables, _ = encode.recorded(rows=150)
-        encode.write_ulog(tables, cls.folder / "flight.ulg")
         cls.log = cls.folder / "log"
-        done = tool("log", "import", cls.folder / "flight.ulg", "--out", cls.log)
+        encode.write_dataflash(tables, cls.folder / "flight.bin")  # of all kinds the one with a barometer
+        done = tool("log", "import", cls.folder / "flight.bin", "--out", cls.log)
         assert done.returncode == 0, done.stderr
 
     @classmethod
@@ -153,20 +153,28 @@ class Replay(unittest.TestCase):
         self.assertIn(done.returncode, (0, 1), done.stderr)  # 1: a busy machine spent the time budget
         return json.loads(done.stdout)
 
-    def test_host_python_and_cortex_m4f_compute_the_same_bits(self):
+    def same_bits_everywhere(self, model, sensors):
         import pflight
-        host = self.host("--particles", 100, "--sensors", "gps,velocity", "--motion", 6, "--sigma_gps", 1)
-        mine = pflight.replay.fly(self.log, particles=100, sensors=("gps", "velocity"), **self.SETTINGS)
+        host = self.host("--particles", 100, "--model", model, "--sensors", sensors, "--motion", 6, "--sigma_gps", 1)
+        mine = pflight.replay.fly(self.log, particles=100, model=model, sensors=tuple(sensors.split(",")), **self.SETTINGS)
         self.assertEqual(f"{mine.hash:016x}", host["hash"])
         self.assertAlmostEqual(mine.mean_nis(), host["metrics"]["nis"]["mean"], places=9)
         if shutil.which("arm-none-eabi-gcc") is None or shutil.which("qemu-system-arm") is None:
             self.skipTest("no Cortex-M4F: tools/setup target")
-        done = tool("target", "run", "replay", "--target", "cortex-m4f", "--particles", 100, "--set", "sensors=gps,velocity",
-                    "--set", "motion=6", "--set", "sigma_gps=1", "--json", "-", environment={"PFLIGHT_DATA": str(self.log)})
+        done = tool("target", "run", "replay", "--target", "cortex-m4f", "--particles", 100, "--set", f"model={model}",
+                    "--set", f"sensors={sensors}", "--set", "motion=6", "--set", "sigma_gps=1", "--json", "-",
+                    environment={"PFLIGHT_DATA": str(self.log)})
         self.assertEqual(done.returncode, 0, done.stderr)
         target = json.loads(done.stdout)
         self.assertTrue(target["same_bits"])
         self.assertEqual(target["hash"], host["hash"])
+        print(f"logs: {model} on {sensors}: hash {host['hash']} on host, in Python and on the Cortex-M4F", file=sys.stderr)
+
+    def test_host_python_and_cortex_m4f_compute_the_same_bits(self):
+        self.same_bits_everywhere("cv", "gps,velocity")
+
+    def test_and_with_height_and_a_biased_barometer(self):
+        self.same_bits_everywhere("hover", "gps,velocity,height,baro")
 
     def test_every_model_in_c_and_python(self):
         import pflight
@@ -197,7 +205,7 @@ class Replay(unittest.TestCase):
 
     def test_what_lacks_is_explained(self):
         for arguments, status, words in [
-                (["--sensors", "baro,gps", "--model", "hover"], 3, "the sensor baro needs baro.csv with the columns t_s, baro_alt_m"),
+                (["--sensors", "fix"], 3, "the sensor fix needs gnss_fix.csv with the columns t_s, north_m, east_m"),
                 (["--model", "odometry"], 3, "the model odometry needs odometry.csv"),
                 (["--sensors", "velocity"], 2, "one of them must be a position"),
                 (["--sensors", "gps,baro"], 2, "--model hover"),

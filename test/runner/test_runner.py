@@ -97,6 +97,12 @@ class Results(unittest.TestCase):
         hashes = {run_json(LAND, "--runs", "3", *line)[1]["hash"] for line in lines}
         self.assertEqual(len(lines), len(hashes))
 
+    def test_a_setting_may_stand_as_an_option(self):
+        line = (LAND, "--runs", "2", "--json", "-")
+        one = json.loads(run(*line, "--set", "case=2").stdout)
+        self.assertEqual(one["hash"], json.loads(run(*line, "--case", "2").stdout)["hash"])
+        self.assertIn("unknown option '--variant'", run(*line, "--variant", "line").stderr)
+
     def test_filters_see_the_same_data(self):
         # The exact Kalman filter and a tuned UKF, each by itself: equal only on the same truth and measurements.
         kf, ukf = (run_json(LAND, "--runs", "10", "--filter", f)[1]["metrics"]["eta"]["mean"] for f in ("kf", "ukf"))

@@ -2,6 +2,7 @@
 #include "replay.h"
 
 #include <math.h>
+#include <string.h>
 
 void replay_judge(const plan_t *plan, table_t runs, verdict_t *verdict)
 {
@@ -15,6 +16,8 @@ void replay_judge(const plan_t *plan, table_t runs, verdict_t *verdict)
     verdict_add(verdict, "nis_inside_95", stats_mean(runs, REPLAY_INSIDE));
     if (isfinite(error.mean)) {
         verdict_add(verdict, "error_m", error);
+    }
+    if (isfinite(error.mean) && strcmp(s->compared, "truth.csv") == 0) { /* another filter's estimate is no truth */
         verdict_add(verdict, "nees", stats_mean(runs, REPLAY_NEES));
     }
     verdict_add(verdict, "rejected", stats_mean(runs, REPLAY_REJECTED));
@@ -28,7 +31,7 @@ void replay_judge(const plan_t *plan, table_t runs, verdict_t *verdict)
              "small, below, too large.\n",
              2.0 - half, 2.0 + half);
     if (isfinite(error.mean)) {
-        text_add(&verdict->notes, "error_m and nees: against %s.\n", s->compared);
+        text_add(&verdict->notes, "error_m: against %s.\n", s->compared);
     } else {
         text_add(&verdict->notes, "No error: neither truth.csv nor nav.csv has north_m and east_m at these times.\n");
     }

@@ -49,7 +49,12 @@ class Replay:
     cov: Array  # (T, D, D)
     innovation: npt.NDArray[np.float64]  # (T, 2), position measured less predicted; NaN for other sensors
     nis: npt.NDArray[np.float64]  # (T,), its square over its covariance: 2 on average for a consistent filter
+    loglik: npt.NDArray[np.float64]  # (T,), of the measured position as predicted: the larger, the better the noises
     hash: int  # of tools/run replay --runs 1, bit for bit
+
+    def mean_loglik(self, from_s: float = 10.0) -> float:
+        late = self.t_s - self.t_s[0] >= from_s
+        return float(np.nanmean(self.loglik[late]))
 
     def mean_nis(self, from_s: float = 10.0) -> float:
         late = self.t_s - self.t_s[0] >= from_s
@@ -175,9 +180,11 @@ def build(folder: str | pathlib.Path, *, model: str = "cv", sensors: Sequence[st
                   draw=_prior(model, log, sigma, start_speed), ess_ratio=ess, seed=seed, circular=circular), log
 
 
-def _nis(cov: Array, sigma: float, e: npt.NDArray[np.float64]) -> float:
+def _surprise(cov: Array, sigma: float, e: npt.NDArray[np.float64]) -> tuple[float, float]:
+    """NIS and Gaussian log-likelihood of an innovation."""
     s = cov[:2, :2].astype(np.float64) + np.eye(2) * float(np.float32(sigma)) ** 2
-    return float(e @ np.linalg.solve(s, e))
+    nis = float(e @ np.linalg.solve(s, e))
+    return nis, -0.5 * (nis + math.log(float(np.linalg.det(s)))) - math.log(2.0 * math.pi)
 
 
 def fly(folder: str | pathlib.Path, **choices: Any) -> Replay:
@@ -187,13 +194,14 @@ def fly(folder: str | pathlib.Path, **choices: Any) -> Replay:
     count = len(log)
     out = Replay(f, np.array([event.t_s for event in log]), [event.sensor for event in log],
                  np.zeros((count, f.states), np.float32), np.zeros((count, f.states, f.states), np.float32),
-                 np.full((count, 2), np.nan), np.full(count, np.nan), HASH_START)
+                 np.full((count, 2), np.nan), np.full(count, np.nan), np.full(count, np.nan), HASH_START)
     for k, event in enumerate(log):
         f.predict(event.t_us, event.odometry)
         if event.sensor in ("gps", "fix"):
             ahead = f.estimate()
             out.innovation[k] = np.asarray(event.z, np.float32).astype(np.float64) - ahead.mean[:2]
-            out.nis[k] = _nis(ahead.cov, choices.get("sigma_gps", _SENSOR_SIGMAS["sigma_gps"]), out.innovation[k])
+            sigma = choices.get("sigma_gps", _SENSOR_SIGMAS["sigma_gps"])
+            out.nis[k], out.loglik[k] = _surprise(ahead.cov, sigma, out.innovation[k])
         f.update(wanted.index(event.sensor), event.t_us, event.z)
         now = f.estimate()
         out.mean[k], out.cov[k] = now.mean, now.cov
