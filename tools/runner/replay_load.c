@@ -174,20 +174,28 @@ static bool take_odometry(replay_study_t *s, const char *data, failure_t *failur
     return true;
 }
 
-/* Truth where there is some, or else what the autopilot made of the flight. */
-static void take_truth(replay_study_t *s, const char *data)
+/* Truth where there is some, or else what the autopilot made of the flight; null: neither. */
+static const char *read_truth(const replay_study_t *s, const char *data, recording_t *rows)
 {
     static const char *const earth[] = {"t_s", "north_m", "east_m"};
     static const char *const room[] = {"t_s", "x_m", "y_m"}; /* the frame of the anchors */
     static const char *const files[] = {"truth.csv", "nav.csv"};
-    recording_t rows = {0};
     failure_t unused = {0};
-    const size_t x = s->model == REPLAY_ODOMETRY && !s->wanted[REPLAY_RANGE] ? 2u : 1u;
-    const char *const *column = s->wanted[REPLAY_RANGE] ? room : earth;
 
-    for (size_t k = 0u; k < 2u && s->compared == NULL; k++) {
-        s->compared = recording_read(&rows, data, files[k], column, 3u, &unused) ? files[k] : NULL;
+    for (size_t k = 0u; k < 2u; k++) {
+        if (recording_read(rows, data, files[k], s->wanted[REPLAY_RANGE] ? room : earth, 3u, &unused)) {
+            return files[k];
+        }
     }
+    return NULL;
+}
+
+static void take_truth(replay_study_t *s, const char *data)
+{
+    recording_t rows = {0};
+    const size_t x = s->model == REPLAY_ODOMETRY && !s->wanted[REPLAY_RANGE] ? 2u : 1u;
+
+    s->compared = read_truth(s, data, &rows);
     for (size_t i = 0u; s->compared != NULL && i < s->events; i++) {
         replay_event_t *e = &s->event[i];
         if (e->t_s >= rows.value[0] && e->t_s <= rows.value[(rows.rows - 1u) * 3u]) {
