@@ -203,13 +203,39 @@ class Replay(unittest.TestCase):
         mine = pflight.replay.fly(folder, model="odometry", sensors=("fix",), sigma_gps=2.0)
         self.assertEqual(f"{mine.hash:016x}", host["hash"])
 
+    def test_ranges_to_anchors(self):
+        import pflight
+        folder = self.folder / "anchors"
+        folder.mkdir(exist_ok=True)
+        random = np.random.default_rng(9)
+        anchors = {3: (0.0, 0.0), 5: (20.0, 0.0), 6: (20.0, 15.0), 9: (0.0, 15.0)}
+        t = np.arange(0, 40, 0.1)
+        x, y = 10 + 6 * np.cos(0.2 * t), 7 + 5 * np.sin(0.2 * t)
+        which = [list(anchors)[k % 4] for k in range(t.size)]
+        ranges = [np.hypot(x[k] - anchors[a][0], y[k] - anchors[a][1]) for k, a in enumerate(which)] + random.normal(0, 0.1, t.size)
+        ranges[26::50] += 8.0  # gross errors, not in the first one
+        (folder / "anchors.csv").write_text("anchor_id,x_m,y_m\n" + "".join(f"{a},{p[0]},{p[1]}\n" for a, p in anchors.items()))
+        (folder / "ranges.csv").write_text("t_s,anchor_id,range_m\n" +
+                                           "".join(f"{a:.2f},{b},{c:.4f}\n" for a, b, c in zip(t, which, ranges)))
+        (folder / "truth.csv").write_text("t_s,x_m,y_m\n" + "".join(f"{a:.2f},{b:.4f},{c:.4f}\n" for a, b, c in zip(t, x, y)))
+        done = tool("run", "replay", "--data", folder, "--runs", 1, "--sensors", "range", "--sigma_range", 0.1, "--start_speed", 2,
+                    "--particles", 1000, "--motion", 1, "--json", "-")
+        host = json.loads(done.stdout)
+        self.assertLess(host["metrics"]["error_m"]["mean"], 0.3)
+        self.assertNotIn("nis", host["metrics"])
+        mine = pflight.replay.fly(folder, sensors=("range",), sigma_range=0.1, start_speed=2.0, particles=1000, motion=1.0)
+        self.assertEqual(f"{mine.hash:016x}", host["hash"])
+        (folder / "anchors.csv").write_text("anchor_id,x_m,y_m\n3,0,0\n")
+        self.assertIn("anchor 5 is not in anchors.csv", tool("run", "replay", "--data", folder, "--sensors", "range").stderr)
+
     def test_what_lacks_is_explained(self):
         for arguments, status, words in [
                 (["--sensors", "fix"], 3, "the sensor fix needs gnss_fix.csv with the columns t_s, north_m, east_m"),
                 (["--model", "odometry"], 3, "the model odometry needs odometry.csv"),
-                (["--sensors", "velocity"], 2, "one of them must be a position"),
+                (["--sensors", "velocity"], 2, "one of them must tell the position"),
+                (["--sensors", "gps,range"], 3, "the sensor range needs ranges.csv with the columns t_s, anchor_id, range_m"),
                 (["--sensors", "gps,baro"], 2, "--model hover"),
-                (["--sensors", "gps,lidar"], 2, "gps, fix, velocity, height, baro"),
+                (["--sensors", "gps,lidar"], 2, "gps, fix, velocity, height, baro, range"),
                 (["--from", "9999"], 3, "no position after that"),
                 (["--model"], 2, "--model needs a value")]:
             done = tool("run", "replay", "--data", self.log, *arguments)

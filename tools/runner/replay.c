@@ -8,7 +8,7 @@ static const setting_t settings[] = {
     {"model", "cv|hover|turn|odometry", 0.0, 0.0, "cv",
      "constant velocity; hovering, with height; a turning vehicle; "
      "wheel odometry"},
-    {"sensors", "gps|fix|velocity|height|baro|...", 0.0, 0.0, "gps", "one or more, with commas: docs/logs.md"},
+    {"sensors", "gps|fix|velocity|height|baro|range|...", 0.0, 0.0, "gps", "one or more, with commas: docs/logs.md"},
     {"motion", "auto|#", 0.0, 1000.0, "auto",
      "noise of the model: cv [m/s^2/sqrt(Hz)], hover [m/s], turn "
      "[m/s/sqrt(s)], odometry [share of the speed]"},
@@ -19,6 +19,9 @@ static const setting_t settings[] = {
     {"sigma_velocity", NULL, 0.001, 1000.0, "0.3", "of a velocity [m/s]"},
     {"sigma_height", NULL, 0.001, 1000.0, "3", "of a GPS height [m]"},
     {"sigma_baro", NULL, 0.001, 1000.0, "0.5", "of a barometer's height [m]"},
+    {"sigma_range", NULL, 0.001, 1000.0, "0.2", "of a range to an anchor [m]"},
+    {"range_dof", NULL, 0.0, 100.0, "3", "degrees of freedom of its Student t; 0: Gaussian"},
+    {"anchors_over", NULL, -1000.0, 1000.0, "0", "height of the anchors over the vehicle [m]"},
     {"start_speed", NULL, 0.0, 1000.0, "10", "how large the velocity may be at first, where none is measured [m/s]"},
     {"ess", NULL, 0.0, 1.0, "0.5", "resample below this share of the particles"},
     {"gate", NULL, 0.0, 1000.0, "0", "refuse a measurement whose -2 log-likelihood is above that; 0: none"},
@@ -26,8 +29,7 @@ static const setting_t settings[] = {
 };
 
 static const char *const columns[REPLAY_COLUMNS] = {
-    "measured_t_s", "x_m",     "y_m", "measured_x_m", "measured_y_m", "truth_x_m",
-    "truth_y_m",    "sigma_m", "nis", "nees",         "ess",
+    "measured_t_s", "x_m", "y_m", "measured_x_m", "measured_y_m", "truth_x_m", "truth_y_m", "sigma_m", "nis", "nees",
 };
 
 /* Is the sensor's name one of those between the commas? */
@@ -55,6 +57,7 @@ static void choose_sensors(replay_study_t *s, const study_t *study)
         [REPLAY_VELOCITY] = {"velocity", "sigma_velocity"},
         [REPLAY_HEIGHT] = {"height", "sigma_height"},
         [REPLAY_BARO] = {"baro", "sigma_baro"},
+        [REPLAY_RANGE] = {"range", "sigma_range"},
     };
 
     for (unsigned k = 0u; k < REPLAY_SENSORS; k++) {
@@ -70,8 +73,8 @@ static float or_auto(const study_t *study, const char *key, const float *automat
 
 static bool can_see(const replay_study_t *s, failure_t *failure)
 {
-    if (!s->wanted[REPLAY_GPS] && !s->wanted[REPLAY_FIX]) {
-        return fail(failure, EXIT_USAGE, "--sensors: one of them must be a position: gps or fix");
+    if (!s->wanted[REPLAY_GPS] && !s->wanted[REPLAY_FIX] && !s->wanted[REPLAY_RANGE]) {
+        return fail(failure, EXIT_USAGE, "--sensors: one of them must tell the position: gps, fix or range");
     }
     if ((s->wanted[REPLAY_HEIGHT] || s->wanted[REPLAY_BARO]) && s->model != REPLAY_HOVER) {
         return fail(failure, EXIT_USAGE, "--sensors: height and baro need a model with height: --model hover");
@@ -95,6 +98,8 @@ static bool open_study(const study_t *study, plan_t *plan, failure_t *failure)
     s->turning = or_auto(study, "turning", turning);
     s->start_speed = (float)study_number(study, "start_speed");
     s->ess_ratio = (float)study_number(study, "ess");
+    s->range_dof = (float)study_number(study, "range_dof");
+    s->anchors_over_m = (float)study_number(study, "anchors_over");
     s->gate = (float)study_number(study, "gate");
     s->from_s = study_number(study, "from");
     s->particles = study->particles;

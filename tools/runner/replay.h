@@ -12,7 +12,15 @@
 
 /* In the order of the setting's choices. */
 typedef enum { REPLAY_CV, REPLAY_HOVER, REPLAY_TURN, REPLAY_ODOMETRY, REPLAY_MODELS } replay_model_t;
-typedef enum { REPLAY_GPS, REPLAY_FIX, REPLAY_VELOCITY, REPLAY_HEIGHT, REPLAY_BARO, REPLAY_SENSORS } replay_sensor_t;
+typedef enum {
+    REPLAY_GPS,
+    REPLAY_FIX,
+    REPLAY_VELOCITY,
+    REPLAY_HEIGHT,
+    REPLAY_BARO,
+    REPLAY_RANGE,
+    REPLAY_SENSORS
+} replay_sensor_t;
 
 typedef struct {
     double t_s;
@@ -20,7 +28,8 @@ typedef struct {
     replay_sensor_t sensor;
     uint32_t row; /* as it was read: measurements of one time and sensor keep their order */
     float z[REPLAY_NUMBERS];
-    double truth[2]; /* position, for the score only; MISSING where there is none */
+    pfl_range_z_t range; /* of a range, made of z: anchor and range */
+    double truth[2];     /* position, for the score only; MISSING where there is none */
     pfl_odometry_input_t odometry;
 } replay_event_t;
 
@@ -31,6 +40,7 @@ typedef struct {
     float motion, turning; /* noise of the model */
     float start_speed;     /* standard deviation of the velocity before it was measured */
     float ess_ratio, gate;
+    float range_dof, anchors_over_m;
     double from_s; /* scored from then on */
     replay_event_t *event;
     size_t events;
@@ -79,7 +89,6 @@ enum {
     REPLAY_COLUMN_SIGMA,
     REPLAY_COLUMN_NIS,
     REPLAY_COLUMN_NEES,
-    REPLAY_COLUMN_ESS,
     REPLAY_COLUMNS
 };
 

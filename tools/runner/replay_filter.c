@@ -27,6 +27,7 @@ typedef struct {
     } motion;
     uint32_t states, noises;
     float mean[REPLAY_STATES_MAX], sigma[REPLAY_STATES_MAX]; /* of the prior */
+    float ring_m;                                            /* radius of one around the mean; 0: none */
 } model_t;
 
 typedef struct {
@@ -34,6 +35,7 @@ typedef struct {
     pfl_position_t seen[REPLAY_SENSORS];
     pfl_velocity_t velocity; /* of the turning vehicle */
     pfl_biased_t baro;
+    pfl_range_t range;
     pfl_sensor_t sensor[REPLAY_SENSORS];
     uint16_t number[REPLAY_SENSORS]; /* a sensor's place among those wanted */
     uint16_t sensors;
@@ -48,6 +50,19 @@ typedef struct {
 
 /* ---- Prior -------------------------------------------------------------------------------------------------------- */
 
+/* Any direction, by a normal so wide that it wraps to uniform. */
+static void draw_ring(const model_t *m, const pfl_batch_t *p)
+{
+    for (uint32_t i = 0u; i < p->n; i++) {
+        const float rho_m = m->ring_m + m->sigma[0] * PFL_NOISE(p, 0)[i];
+        float sine;
+        float cosine;
+        pfl_sincosf(pfl_wrap_pi(10.0f * PFL_NOISE(p, 1)[i]), &sine, &cosine);
+        PFL_STATE(p, 0)[i] = m->mean[0] + rho_m * cosine;
+        PFL_STATE(p, 1)[i] = m->mean[1] + rho_m * sine;
+    }
+}
+
 static void draw(void *user, const pfl_batch_t *p)
 {
     const model_t *m = user;
@@ -56,6 +71,9 @@ static void draw(void *user, const pfl_batch_t *p)
         for (uint32_t i = 0u; i < p->n; i++) {
             PFL_STATE(p, d)[i] = m->mean[d] + m->sigma[d] * PFL_NOISE(p, d)[i];
         }
+    }
+    if (m->ring_m > 0.0f) {
+        draw_ring(m, p);
     }
 }
 
@@ -67,6 +85,14 @@ static void start(model_t *m, uint32_t state, float mean, float sigma)
 
 static void start_position(const replay_study_t *s, model_t *m)
 {
+    if (!s->wanted[REPLAY_GPS] && !s->wanted[REPLAY_FIX]) {
+        const pfl_range_z_t *z = &s->event[replay_first(s, REPLAY_RANGE)].range;
+        const float square = z->range_m * z->range_m - z->height_m * z->height_m;
+        start(m, 0u, z->anchor_x_m, s->sigma[REPLAY_RANGE]);
+        start(m, 1u, z->anchor_y_m, s->sigma[REPLAY_RANGE]);
+        m->ring_m = pfl_sqrtf(square > 0.0f ? square : 0.0f);
+        return;
+    }
     const replay_sensor_t sensor = s->wanted[REPLAY_GPS] ? REPLAY_GPS : REPLAY_FIX;
     const replay_event_t *e = &s->event[replay_first(s, sensor)];
 
@@ -184,6 +210,10 @@ static pfl_sensor_t make_sensor(const replay_study_t *s, setup_t *u, unsigned se
         u->baro = (pfl_biased_t){.count = 1u, .state = {2u}, .bias = {6u}, .inv_sigma = {inv_sigma}};
         return (pfl_sensor_t){.loglik = pfl_biased_loglik, .user = &u->baro, .gate = s->gate};
     }
+    if (sensor == REPLAY_RANGE) {
+        u->range = (pfl_range_t){0u, 1u, inv_sigma, s->range_dof};
+        return (pfl_sensor_t){.loglik = pfl_range_loglik, .user = &u->range, .gate = s->gate};
+    }
     if (sensor == REPLAY_VELOCITY && s->model == REPLAY_TURN) {
         u->velocity = (pfl_velocity_t){PFL_TURN_SPEED, PFL_TURN_HEADING, inv_sigma};
         return (pfl_sensor_t){.loglik = pfl_velocity_loglik, .user = &u->velocity, .gate = s->gate};
@@ -297,13 +327,13 @@ static bool cycle(const replay_study_t *s, const setup_t *u, pfl_t *filter, size
         }
         score_innovation(s, e, mean, cov, states, row, sums);
     }
-    if (!check(pfl_update(filter, u->number[e->sensor], e->t_us, e->z), "pfl_update", i, failure) ||
+    const void *z = e->sensor == REPLAY_RANGE ? (const void *)&e->range : e->z;
+    if (!check(pfl_update(filter, u->number[e->sensor], e->t_us, z), "pfl_update", i, failure) ||
         !check(pfl_estimate(filter, mean, cov), "pfl_estimate", i, failure) ||
         !check(pfl_health(filter, &health), "pfl_health", i, failure)) {
         return false;
     }
     score_estimate(s, e, mean, cov, states, row, sums);
-    row[REPLAY_COLUMN_ESS] = (double)health.ess;
     sums->ess += (double)health.ess;
     out->hash = hash_floats(out->hash, mean, states);
     out->cycles_ns[i] = (uint32_t)((double)health.cycles_last * 1e9 / (double)pfl_port_cycles_hz());
@@ -324,13 +354,14 @@ static bool fly(const replay_study_t *s, const setup_t *u, pfl_t *filter, run_ou
             return false;
         }
     }
-    if (sums.positions == 0u) {
-        return fail(failure, EXIT_USAGE, "--set from=%g: the log has no position after that", s->from_s);
+    if (sums.positions == 0u && sums.compared == 0u) {
+        return fail(failure, EXIT_USAGE, "--set from=%g: the log has no position after that, measured or true",
+                    s->from_s);
     }
     const double positions = (double)sums.positions;
-    out->value[REPLAY_INNOVATION] = sqrt(sums.innovation / positions);
-    out->value[REPLAY_NIS] = sums.nis / positions;
-    out->value[REPLAY_INSIDE] = (double)sums.inside / positions;
+    out->value[REPLAY_INNOVATION] = sums.positions > 0u ? sqrt(sums.innovation / positions) : MISSING;
+    out->value[REPLAY_NIS] = sums.positions > 0u ? sums.nis / positions : MISSING;
+    out->value[REPLAY_INSIDE] = sums.positions > 0u ? (double)sums.inside / positions : MISSING;
     out->value[REPLAY_SCORED] = positions;
     out->value[REPLAY_ERROR] = sums.compared > 0u ? sqrt(sums.error / (double)sums.compared) : MISSING;
     out->value[REPLAY_NEES] = sums.compared > 0u ? sums.nees / (double)sums.compared : MISSING;

@@ -21,6 +21,7 @@ static const source_t sources[REPLAY_SENSORS] = {
     [REPLAY_VELOCITY] = {"velocity", "gps.csv", {"t_s", "?vn_mps", "?ve_mps"}, 2u},
     [REPLAY_HEIGHT] = {"height", "gps.csv", {"t_s", "?alt_msl_m", NULL}, 1u},
     [REPLAY_BARO] = {"baro", "baro.csv", {"t_s", "?baro_alt_m", NULL}, 1u},
+    [REPLAY_RANGE] = {"range", "ranges.csv", {"t_s", "?anchor_id", "?range_m"}, 2u},
 };
 
 static const char *bare(const char *column)
@@ -81,7 +82,7 @@ static int by_time(const void *a, const void *b)
 static void take_row(replay_study_t *s, unsigned sensor, const double *row)
 {
     replay_event_t *e = &s->event[s->events];
-    const bool swapped = s->model == REPLAY_ODOMETRY;
+    const bool swapped = s->model == REPLAY_ODOMETRY && sensor != REPLAY_RANGE;
 
     *e = (replay_event_t){
         .t_s = row[0], .sensor = (replay_sensor_t)sensor, .row = (uint32_t)s->events, .truth = {MISSING, MISSING}};
@@ -119,6 +120,40 @@ static bool take_sensor(replay_study_t *s, unsigned sensor, const char *data, fa
                                       data, source->file, source->name);
 }
 
+/* Row of the anchor with this number; anchors->rows without one. */
+static size_t find_anchor(const recording_t *anchors, double number)
+{
+    size_t k = 0u;
+
+    while (k < anchors->rows && fabs(anchors->value[k * 3u] - number) > 0.5) {
+        k++;
+    }
+    return k;
+}
+
+static bool take_anchors(replay_study_t *s, const char *data, failure_t *failure)
+{
+    static const char *const column[] = {"anchor_id", "x_m", "y_m"};
+    recording_t rows = {0};
+    bool found = true;
+
+    if (!recording_read(&rows, data, "anchors.csv", column, 3u, failure)) {
+        return explain(failure, "the sensor range", "anchors.csv", column, 3u);
+    }
+    for (size_t i = 0u; i < s->events && found; i++) {
+        replay_event_t *e = &s->event[i];
+        const size_t k = e->sensor == REPLAY_RANGE ? find_anchor(&rows, (double)e->z[0]) : 0u;
+        found = k < rows.rows ||
+                fail(failure, EXIT_HARNESS, "%s/ranges.csv: anchor %g is not in anchors.csv", data, (double)e->z[0]);
+        if (found) {
+            e->range = (pfl_range_z_t){(float)rows.value[k * 3u + 1u], (float)rows.value[k * 3u + 2u],
+                                       s->anchors_over_m, e->z[1], 1.0f};
+        }
+    }
+    recording_free(&rows);
+    return found;
+}
+
 /* Each measurement gets the last speed and turn rate before it. */
 static bool take_odometry(replay_study_t *s, const char *data, failure_t *failure)
 {
@@ -139,18 +174,28 @@ static bool take_odometry(replay_study_t *s, const char *data, failure_t *failur
     return true;
 }
 
-/* Truth where there is some, or else what the autopilot made of the flight. */
+/* Truth where there is some, or else what the autopilot made of the flight; null: neither. */
+static const char *read_truth(const replay_study_t *s, const char *data, recording_t *rows)
+{
+    static const char *const earth[] = {"t_s", "north_m", "east_m"};
+    static const char *const room[] = {"t_s", "x_m", "y_m"}; /* the frame of the anchors */
+    static const char *const files[] = {"truth.csv", "nav.csv"};
+    failure_t unused = {0};
+
+    for (size_t k = 0u; k < 2u; k++) {
+        if (recording_read(rows, data, files[k], s->wanted[REPLAY_RANGE] ? room : earth, 3u, &unused)) {
+            return files[k];
+        }
+    }
+    return NULL;
+}
+
 static void take_truth(replay_study_t *s, const char *data)
 {
-    static const char *const column[] = {"t_s", "north_m", "east_m"};
-    static const char *const files[] = {"truth.csv", "nav.csv"};
     recording_t rows = {0};
-    failure_t unused = {0};
-    const size_t x = s->model == REPLAY_ODOMETRY ? 2u : 1u;
+    const size_t x = s->model == REPLAY_ODOMETRY && !s->wanted[REPLAY_RANGE] ? 2u : 1u;
 
-    for (size_t k = 0u; k < 2u && s->compared == NULL; k++) {
-        s->compared = recording_read(&rows, data, files[k], column, 3u, &unused) ? files[k] : NULL;
-    }
+    s->compared = read_truth(s, data, &rows);
     for (size_t i = 0u; s->compared != NULL && i < s->events; i++) {
         replay_event_t *e = &s->event[i];
         if (e->t_s >= rows.value[0] && e->t_s <= rows.value[(rows.rows - 1u) * 3u]) {
@@ -176,5 +221,6 @@ bool replay_load(replay_study_t *s, const char *data, failure_t *failure)
         return fail(failure, EXIT_HARNESS, "%s: all measurements are of one time: nothing to fly", data);
     }
     take_truth(s, data);
-    return s->model != REPLAY_ODOMETRY || take_odometry(s, data, failure);
+    return (!s->wanted[REPLAY_RANGE] || take_anchors(s, data, failure)) &&
+           (s->model != REPLAY_ODOMETRY || take_odometry(s, data, failure));
 }

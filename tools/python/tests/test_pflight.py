@@ -218,6 +218,9 @@ class Calls(unittest.TestCase):
         with self.assertRaises(pf.Error):
             make_filter().update(1, 0, [0, 0])
 
+    def test_the_version_is_the_library_s(self):
+        self.assertIn(f"project(pflight VERSION {pf.__version__} ", (ROOT / "CMakeLists.txt").read_text())
+
     def test_every_ready_model_and_sensor_is_there_and_starts(self):
         header = (ROOT / "lib/include/pflight/models.h").read_text()
         self.assertEqual(set(re.findall(r"void pfl_(\w+)_predict\(", header)), set(pf.models()))

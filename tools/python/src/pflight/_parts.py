@@ -130,6 +130,7 @@ _MODELS: dict[str, tuple[str, _Count, _Count, str | None]] = {
     "land_vehicle_jitter": ("pfl_land_vehicle_t", 4, 4, "pfl_land_input_t"),
     "constant_velocity": ("pfl_constant_velocity_t", 4, lambda c: 4 if c.sigma_position > 0 else 2, None),
     "odometry": ("pfl_odometry_t", 3, 4, "pfl_odometry_input_t"),
+    "wheels": ("pfl_wheels_t", 5, 6, "pfl_odometry_input_t"),
     "road_target": ("pfl_road_target_t", 4, 2, None),
     "lane_target": ("pfl_lane_target_t", 3, 2, None),
     "planar_uav": ("pfl_planar_uav_t", 5, lambda c: 2 if c.sigma_speed > 0 or c.sigma_turn > 0 else 0,
@@ -140,6 +141,7 @@ _MODELS: dict[str, tuple[str, _Count, _Count, str | None]] = {
     "turn": ("pfl_turn_t", lambda c: 7 if c.remember else 5, lambda c: 4 if c.redraw_hz > 0 else 2, None),
     "hover": ("pfl_hover_t", lambda c: 2 * c.axes + c.biases, lambda c: c.axes + c.biases, None),
 }
+_MODELS = {name: entry for name, entry in _MODELS.items() if hasattr(lib, f"pfl_{name}_predict")}  # an older library
 _SENSORS: dict[str, tuple[str, str | None]] = {
     "position": ("pfl_position_t", None),
     "position_distance": ("pfl_position_t", None),

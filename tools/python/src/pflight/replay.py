@@ -14,8 +14,8 @@ import numpy as np
 import numpy.typing as npt
 
 from ._filter import HASH_START, Filter, hash_estimates
-from ._parts import Array, Draw, Model, Sensor, gaussian, model, sensor
-from ._pflight import lib
+from ._parts import Array, Draw, Model, Sensor, gaussian, model, python_draw, sensor
+from ._pflight import ffi, lib
 
 UNBIASED = 0xFFFF
 # Sensors in their order, with file, columns, standard deviation.
@@ -25,8 +25,9 @@ _SOURCES: dict[str, tuple[str, tuple[str, ...], str]] = {
     "velocity": ("gps.csv", ("vn_mps", "ve_mps"), "sigma_velocity"),
     "height": ("gps.csv", ("alt_msl_m",), "sigma_height"),
     "baro": ("baro.csv", ("baro_alt_m",), "sigma_baro"),
+    "range": ("ranges.csv", ("anchor_id", "range_m"), "sigma_range"),
 }
-_SENSOR_SIGMAS = {"sigma_gps": 1.5, "sigma_velocity": 0.3, "sigma_height": 3.0, "sigma_baro": 0.5}
+_SENSOR_SIGMAS = {"sigma_gps": 1.5, "sigma_velocity": 0.3, "sigma_height": 3.0, "sigma_baro": 0.5, "sigma_range": 0.2}
 _MOTION = {"cv": 2.0, "hover": 3.0, "turn": 2.0, "odometry": 0.1}
 _TURNING = {"cv": 0.0, "hover": 0.0, "turn": 0.2, "odometry": 0.05}
 
@@ -36,7 +37,7 @@ class Event:
     t_s: float
     t_us: int
     sensor: str
-    z: list[float]
+    z: list[float]  # of a range the fields of pfl_range_z_t
     odometry: tuple[float, float] = (0.0, 0.0)
 
 
@@ -83,7 +84,7 @@ def events(folder: str | pathlib.Path, sensors: Sequence[str], swapped: bool = F
         for row in _read(folder, file, ("t_s", *columns), f"the sensor {name}"):
             if not np.any(np.isnan(row)):
                 z = [float(number) for number in row[1:]]
-                found.append((float(row[0]), order, Event(float(row[0]), 0, name, z[::-1] if swapped else z)))
+                found.append((float(row[0]), order, Event(float(row[0]), 0, name, z[::-1] if swapped and name != "range" else z)))
     found.sort(key=lambda entry: entry[:2])
     for _, _, event in found:
         event.t_us = math.floor((event.t_s - found[0][0]) * 1e6 + 0.5)
@@ -99,11 +100,14 @@ def _f(x: float) -> Any:
 
 
 def _prior(kind: str, log: Sequence[Event], sigma: dict[str, float], start_speed: float) -> Draw:
-    position = _first(log, "gps") or _first(log, "fix")
-    if position is None:
-        raise ValueError("one of the sensors must be a position: gps or fix")
+    position, first_range = _first(log, "gps") or _first(log, "fix"), _first(log, "range")
     velocity = _first(log, "velocity")
-    mean, spread = list(position.z), [sigma[position.sensor]] * 2
+    if position is not None:
+        mean, spread = list(position.z), [sigma[position.sensor]] * 2
+    elif first_range is not None:
+        mean, spread = first_range.z[:2], [sigma["range"]] * 2
+    else:
+        raise ValueError("one of the sensors must tell the position: gps, fix or range")
     v, v_sigma = (velocity.z, sigma["velocity"]) if velocity else ([0.0, 0.0], start_speed)
     if kind == "cv":
         mean, spread = mean + v, spread + [v_sigma] * 2
@@ -123,7 +127,27 @@ def _prior(kind: str, log: Sequence[Event], sigma: dict[str, float], start_speed
         mean, spread = mean + [speed, heading, 0.0], spread + [v_sigma, 0.3 if course else 3.0, 0.2]
     else:
         mean, spread = mean + [0.0], spread + [3.0]
+    if position is None and first_range is not None:
+        return _ring(gaussian(mean, spread), first_range.z)
     return gaussian(mean, spread)
+
+
+def _ring(prior: Draw, z: Sequence[float]) -> Draw:
+    """Around the anchor of the first range, in any direction."""
+    height, measured = _f(z[2]), _f(z[3])
+    square = measured * measured - height * height
+    radius = _f(lib.pfl_sqrtf(float(max(square, _f(0.0)))))
+    sine, cosine = ffi.new("float *"), ffi.new("float *")
+
+    def ring(x: Array, w: Array) -> None:
+        x[:] = prior.mean[:, None] + prior.sigma[:, None] * w
+        rho = radius + prior.sigma[0] * w[0]
+        for i, wide in enumerate(_f(10.0) * w[1]):
+            lib.pfl_sincosf(lib.pfl_wrap_pi(float(wide)), sine, cosine)
+            x[0, i] = prior.mean[0] + rho[i] * _f(cosine[0])
+            x[1, i] = prior.mean[1] + rho[i] * _f(sine[0])
+
+    return python_draw(ring)
 
 
 def _model(kind: str, motion: float, turning: float, both_heights: bool) -> tuple[Model, Sequence[int]]:
@@ -140,7 +164,9 @@ def _model(kind: str, motion: float, turning: float, both_heights: bool) -> tupl
     raise ValueError(f"no model '{kind}'; the models are: {', '.join(_MOTION)}")
 
 
-def _sensor(kind: str, name: str, sigma: float, gate: float) -> Sensor:
+def _sensor(kind: str, name: str, sigma: float, gate: float, range_dof: float) -> Sensor:
+    if name == "range":
+        return sensor("range", x_state=0, y_state=1, sigma=sigma, dof=range_dof, gate=gate)
     if name == "baro":
         return sensor("biased", state=[2], bias=[6], sigma=[sigma], gate=gate)
     if name == "velocity" and kind == "turn":
@@ -158,10 +184,23 @@ def _take_odometry(log: Sequence[Event], folder: pathlib.Path) -> None:
         event.odometry = (float(rows[k, 1]), float(rows[k, 2]))
 
 
+def _take_anchors(log: Sequence[Event], folder: pathlib.Path, over_m: float) -> None:
+    """Ranges get their anchors."""
+    rows = _read(folder, "anchors.csv", ("anchor_id", "x_m", "y_m"), "the sensor range").tolist()
+    where = {round(row[0]): row[1:] for row in rows}
+    for event in log:
+        if event.sensor == "range":
+            if round(event.z[0]) not in where:
+                raise ValueError(f"{folder / 'ranges.csv'}: anchor {event.z[0]:g} is not in anchors.csv")
+            event.z = [*where[round(event.z[0])], over_m, event.z[1], 1.0]
+
+
 def build(folder: str | pathlib.Path, *, model: str = "cv", sensors: Sequence[str] = ("gps",), particles: int = 500,
           seed: int = 2, motion: float | None = None, turning: float | None = None, ess: float = 0.5, gate: float = 0.0,
-          start_speed: float = 10.0, **sigmas: float) -> tuple[Filter, list[Event]]:
-    """The filter of `tools/run replay` and its log. sigmas: sigma_gps, sigma_velocity, sigma_height, sigma_baro."""
+          start_speed: float = 10.0, range_dof: float = 3.0, anchors_over: float = 0.0,
+          **sigmas: float) -> tuple[Filter, list[Event]]:
+    """The filter of `tools/run replay` and its log. sigmas: sigma_gps, sigma_velocity, sigma_height, sigma_baro,
+    sigma_range."""
     wrong = set(sigmas) - set(_SENSOR_SIGMAS)
     if wrong:
         raise TypeError(f"unknown {', '.join(sorted(wrong))}; the deviations are: {', '.join(_SENSOR_SIGMAS)}")
@@ -172,11 +211,13 @@ def build(folder: str | pathlib.Path, *, model: str = "cv", sensors: Sequence[st
     log = events(folder, sensors, swapped=model == "odometry")
     if model == "odometry":
         _take_odometry(log, pathlib.Path(folder))
+    if "range" in sensors:
+        _take_anchors(log, pathlib.Path(folder), anchors_over)
     motion_model, circular = _model(model, _MOTION[model] if motion is None else motion,
                                     _TURNING[model] if turning is None else turning,
                                     {"height", "baro"} <= set(sensors))
     wanted = [name for name in _SOURCES if name in sensors]
-    return Filter(motion_model, [_sensor(model, name, sigma[name], gate) for name in wanted], particles=particles,
+    return Filter(motion_model, [_sensor(model, name, sigma[name], gate, range_dof) for name in wanted], particles=particles,
                   draw=_prior(model, log, sigma, start_speed), ess_ratio=ess, seed=seed, circular=circular), log
 
 
