@@ -246,7 +246,7 @@ static bool bins_are_good(const pfl_adaptive_t *a)
 static bool is_good(const pfl_adaptive_t *a)
 {
     return (a->least >= 1u) && (a->least <= a->most) && (a->config.particles <= a->most) &&
-           (a->most <= PFL_PARTICLES_MAX) && (a->config.particles >= 1u) && bins_are_good(a);
+           (a->most <= PFL_PARTICLES_MAX) && bins_are_good(a);
 }
 
 /* Within the bounds, in whole groups where these allow it. */

@@ -78,11 +78,11 @@ static void add_row(const pfl_marginal_t *m, const float *row, const pfl_batch_t
     }
 }
 
-/* l <- l + gain e */
-static void add_gain(const pfl_marginal_t *m, const float *gain, const float *e, const pfl_batch_t *p)
+/* l <- l + factor gain e */
+static void add_gain(const pfl_marginal_t *m, const float *gain, float factor, const float *e, const pfl_batch_t *p)
 {
     for (uint32_t j = 0u; j < m->linear; j++) {
-        pfl_marginal_add_scaled(PFL_STATE(p, m->mean + j), gain[j], e, p->n);
+        pfl_marginal_add_scaled(PFL_STATE(p, m->mean + j), gain[j] * factor, e, p->n);
     }
 }
 
@@ -91,13 +91,9 @@ static void drive(const pfl_marginal_shared_t *s, const pfl_batch_t *p)
     const pfl_marginal_t *m = &s->model;
     for (uint32_t k = 0u; k < m->driven; k++) {
         float *x = PFL_STATE(p, m->state[k]);
-        float gain[PFL_MARGINAL_MAX];
-        for (uint32_t j = 0u; j < m->linear; j++) {
-            gain[j] = s->drive_gain[k][j] * s->drive_root[k];
-        }
         add_row(m, m->drive[k], p, x);
         pfl_marginal_add_scaled(x, s->drive_root[k], PFL_NOISE(p, m->noise[k]), p->n);
-        add_gain(m, gain, PFL_NOISE(p, m->noise[k]), p);
+        add_gain(m, s->drive_gain[k], s->drive_root[k], PFL_NOISE(p, m->noise[k]), p);
     }
 }
 
@@ -127,7 +123,7 @@ static void see(const pfl_marginal_shared_t *s, const float *z, const pfl_batch_
             e[i] = z[k] - e[i];
             ll[i] -= weight * (e[i] * e[i]);
         }
-        add_gain(m, s->see_gain[k], e, p);
+        add_gain(m, s->see_gain[k], 1.0f, e, p);
     }
 }
 

@@ -17,9 +17,9 @@ typedef struct {
     float scale_spread;
     float bias_spread;
     float dt_s;
-} step_t;
+} rolling_t;
 
-static void learn(const step_t *s, const pfl_batch_t *p)
+static void learn(const rolling_t *s, const pfl_batch_t *p)
 {
     float *restrict scale = PFL_STATE(p, PFL_WHEELS_SCALE);
     float *restrict bias = PFL_STATE(p, PFL_WHEELS_BIAS);
@@ -31,7 +31,7 @@ static void learn(const step_t *s, const pfl_batch_t *p)
     }
 }
 
-static void move(const step_t *s, const pfl_batch_t *p)
+static void move(const rolling_t *s, const pfl_batch_t *p)
 {
     float way[PART];
     float direction[PART];
@@ -66,14 +66,14 @@ void pfl_wheels_predict(void *user, const void *u, float dt_s, const pfl_batch_t
     const float root = pfl_sqrtf(dt_s);
     const float speed = (in->speed_mps < 0.0f) ? -in->speed_mps : in->speed_mps;
     const float rate = (in->turn_radps < 0.0f) ? -in->turn_radps : in->turn_radps;
-    const step_t step = {dt_s * in->speed_mps,
-                         dt_s * in->turn_radps,
-                         root * (m->speed_share * speed),
-                         root * (m->sigma_turn + (m->turn_share * rate)),
-                         root * m->sigma_position,
-                         root * m->scale_walk,
-                         root * m->bias_walk,
-                         dt_s};
+    const rolling_t step = {dt_s * in->speed_mps,
+                            dt_s * in->turn_radps,
+                            root * (m->speed_share * speed),
+                            root * (m->sigma_turn + (m->turn_share * rate)),
+                            root * m->sigma_position,
+                            root * m->scale_walk,
+                            root * m->bias_walk,
+                            dt_s};
     learn(&step, p);
     for (uint32_t from = 0u; from < p->n; from += PART) {
         const uint32_t left = p->n - from;

@@ -112,9 +112,9 @@ static void give_away(pfl_t *f, uint32_t left)
     /*@ loop invariant i <= f->config->particles;
         loop assigns i, left, f->log_weight[0 .. f->stride - 1];
         loop variant f->config->particles - i; */
-    for (uint32_t i = 0u; (left > 0u) && (i < f->config->particles); i++) {
+    for (uint32_t i = 0u; i < f->config->particles; i++) {
         const uint32_t copies = pfl_load_u32(&f->log_weight[i]);
-        const uint32_t more = (copies > 0u) ? 1u : 0u;
+        const uint32_t more = ((copies > 0u) && (left > 0u)) ? 1u : 0u;
         pfl_store_u32(&f->log_weight[i], copies + more);
         left -= more;
     }

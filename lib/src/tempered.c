@@ -175,16 +175,12 @@ static pfl_status_t step_more(pfl_t *f, fusion_t *w)
 
 static pfl_status_t fuse(pfl_t *f, uint64_t t_us, fusion_t *w)
 {
-    pfl_status_t status = pfl_begin(f);
-    if (status != PFL_OK) {
-        return status;
-    }
     w->m->held = NULL;
     w->m->taken = 0u;
     if (t_us == f->t_us) {
         prepare(f, w);
     }
-    status = pfl_end(f, PFL_OK);
+    pfl_status_t status = pfl_end(f, PFL_OK);
     if (status == PFL_OK) {
         status = pfl_update(f, (uint16_t)w->sensor, t_us, w->z);
     }
@@ -202,14 +198,14 @@ static pfl_status_t fuse(pfl_t *f, uint64_t t_us, fusion_t *w)
 
 pfl_status_t pfl_tempered_update(pfl_t *f, uint16_t sensor, uint64_t t_us, const void *z)
 {
-    const pfl_status_t entered = (z != NULL) ? pfl_enter(f) : PFL_ERR_ARG;
+    const pfl_status_t entered = (z != NULL) ? pfl_begin(f) : PFL_ERR_ARG;
     if (entered != PFL_OK) {
         return entered;
     }
     const pfl_config_t *c = f->config;
     if ((sensor >= c->sensor_count) || (c->sensors[sensor].loglik != pfl_tempered_loglik) ||
         (c->sensors[sensor].user == NULL)) {
-        return PFL_ERR_SENSOR;
+        return pfl_end(f, PFL_ERR_SENSOR);
     }
     fusion_t w = {(pfl_tempered_t *)c->sensors[sensor].user, z, sensor, 0.0f, 1.0f};
     return fuse(f, t_us, &w);

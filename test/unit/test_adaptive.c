@@ -17,6 +17,7 @@
 
 static uint32_t cycles;
 static uint32_t price; /* cycles a particle and callback */
+static uint32_t mask;  /* of the counter; 0: there is none */
 static pfl_adaptive_t adaptive;
 static uint32_t words[1024];
 
@@ -28,7 +29,7 @@ uint32_t pfl_port_cycles(void)
 
 uint32_t pfl_port_cycles_mask(void)
 {
-    return 0xFFFFFFFFu;
+    return mask;
 }
 
 uint32_t pfl_port_cycles_hz(void)
@@ -64,6 +65,7 @@ void setUp(void)
 {
     cycles = 0u;
     price = 100u;
+    mask = 0xFFFFFFFFu;
     memset(&adaptive, 0, sizeof adaptive);
     adaptive.config = ut_linear_config(MOST);
     adaptive.config.ess_ratio = 0.0f;
@@ -455,4 +457,219 @@ void test_wrong_calls_are_refused(void)
     TEST_ASSERT_EQUAL_INT(PFL_ERR_MEMORY, pfl_adaptive_init(words, 100u, &adaptive, 0u, &f));
     adaptive.least = MOST + 1u;
     TEST_ASSERT_EQUAL_INT(PFL_ERR_CONFIG, pfl_adaptive_init(words, 100u, &adaptive, 0u, &f));
+}
+
+static void check_refused(pfl_t *f, const pfl_adaptive_t *good)
+{
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_CONFIG, pfl_adapt(f, &adaptive));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_CONFIG, pfl_set_particles(f, &adaptive, 60u));
+    adaptive = *good;
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_adapt(f, &adaptive));
+}
+
+void test_every_setting_is_judged(void)
+{
+    adaptive.error = 0.05f;
+    pfl_t *f = start();
+    const pfl_adaptive_t good = adaptive;
+    adaptive.bins = NULL;
+    check_refused(f, &good);
+    adaptive.bits = 16u;
+    check_refused(f, &good);
+    adaptive.bits = 1u << 25;
+    check_refused(f, &good);
+    adaptive.dimensions = 0u;
+    check_refused(f, &good);
+    adaptive.most = MOST - 1u; /* fewer than there are */
+    check_refused(f, &good);
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_set_particles(NULL, &adaptive, 60u));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_adaptive_init(words, sizeof words, NULL, 0u, &f));
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_adaptive_init(words, sizeof words, &adaptive, 0u, NULL));
+    adaptive.most = PFL_PARTICLES_MAX + 1u;
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_CONFIG, pfl_adaptive_init(words, sizeof words, &adaptive, 0u, &f));
+}
+
+/* ---- The limits of both --------------------------------------------------------------------------------------------- */
+
+static uint32_t resampled(const pfl_t *f)
+{
+    pfl_health_t health;
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_health(f, &health));
+    TEST_ASSERT_EQUAL_UINT32(0u, health.overruns);
+    return health.resampled;
+}
+
+void test_equal_weights_are_not_resampled(void)
+{
+    const float z = 0.3f;
+    adaptive.ess_ratio = 1.0f;
+    pfl_t *f = start();
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_update(f, 0u, 0u, &z));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_adapt(f, &adaptive));
+    TEST_ASSERT_EQUAL_UINT32(1u, resampled(f));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_adapt(f, &adaptive));
+    TEST_ASSERT_EQUAL_UINT32(1u, resampled(f));
+}
+
+void test_time_needs_a_budget_and_a_counter(void)
+{
+    adaptive.budget_share = 0.9f;
+    (void)start();
+    TEST_ASSERT_EQUAL_UINT32(MOST, adaptive.config.particles);
+    adaptive.config.budget_cycles = 1000000u;
+    mask = 0u;
+    (void)start();
+    TEST_ASSERT_EQUAL_UINT32(MOST, adaptive.config.particles);
+    mask = 0xFFFFFFFFu;
+    (void)start();
+    TEST_ASSERT_EQUAL_UINT32(adaptive.least, adaptive.config.particles);
+}
+
+/* Two callbacks of 100 cycles a particle, and 10 cycles a look at the clock: time for all of `least` particles, but for
+ * fewer by the share that may be used. They stay, and are not resampled again and again. */
+void test_with_hardly_any_time_the_fewest_stay(void)
+{
+    const float z = 0.3f;
+    adaptive.budget_share = 0.9f;
+    adaptive.ess_ratio = 0.0f;
+    adaptive.config.budget_cycles = 11000u;
+    pfl_t *f = start();
+    for (uint32_t step = 1u; step <= 20u; step++) {
+        (void)ut_fly_linear(f, step * 100000u, z, 0u);
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_adapt(f, &adaptive));
+        TEST_ASSERT_EQUAL_UINT32(adaptive.least, adaptive.config.particles);
+    }
+    TEST_ASSERT_EQUAL_UINT32(2u, resampled(f)); /* as it began, and in the first cycle, to learn its cost */
+}
+
+void test_with_all_the_time_there_are_the_most(void)
+{
+    const float z = 0.3f;
+    adaptive.budget_share = 0.9f;
+    adaptive.ess_ratio = 1.0f;
+    adaptive.config.budget_cycles = 1000000000u;
+    pfl_t *f = start();
+    TEST_ASSERT_EQUAL_UINT32(adaptive.least, adaptive.config.particles);
+    for (uint32_t step = 1u; step <= 3u; step++) {
+        (void)ut_fly_linear(f, step * 100000u, z, 0u);
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_adapt(f, &adaptive));
+    }
+    TEST_ASSERT_EQUAL_UINT32(MOST, adaptive.config.particles);
+}
+
+/* Cells that a cloud held in place covers, by its first state alone. */
+static uint32_t covered(const float *x, uint32_t bits, uint64_t circular_mask)
+{
+    static const pfl_sensor_t dictated = {.loglik = ut_dictated_loglik};
+    static float flat[MOST];
+    ut_table_t table = {x, MOST, 2u};
+    adaptive.config.draw = ut_table_draw;
+    adaptive.config.predict = ut_hold_predict;
+    adaptive.config.user = &table;
+    adaptive.config.sensors = &dictated;
+    adaptive.config.circular_mask = (uint32_t)circular_mask;
+    adaptive.config.circular = (circular_mask != 0u) ? pfl_circular_means : NULL;
+    adaptive.error = 0.05f;
+    adaptive.ess_ratio = 1.0f;
+    adaptive.dimensions = 1u;
+    adaptive.bits = bits;
+    pfl_t *f = start();
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_update(f, 0u, 0u, flat));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_adapt(f, &adaptive));
+    TEST_ASSERT_TRUE(pfl_invariants_hold(f));
+    return adaptive.covered;
+}
+
+void test_cells_at_the_ends_of_the_numbers(void)
+{
+    static float x[2u * MOST];
+    for (uint32_t i = 0u; i < MOST; i++) {
+        x[i] = ((i & 1u) != 0u) ? 1.0e30f : -2.0e30f; /* beyond what an integer holds */
+    }
+    TEST_ASSERT_EQUAL_UINT32(2u, covered(x, 1024u, 0u));
+    for (uint32_t i = 0u; i < MOST; i++) {
+        x[i] = (float)(int32_t)i; /* a cell for each */
+    }
+    TEST_ASSERT_EQUAL_UINT32(111u, covered(x, 32u, 0u)); /* 32 log 32: all that these bits can tell */
+}
+
+void test_angles_are_counted_on_the_circle(void)
+{
+    static float x[2u * MOST];
+    for (uint32_t i = 0u; i < MOST; i++) {
+        x[i] = 0.2f + (6.2831853f * (float)(int32_t)(i % 5u));
+    }
+    TEST_ASSERT_EQUAL_UINT32(5u, covered(x, 4096u, 0u));
+    TEST_ASSERT_EQUAL_UINT32(1u, covered(x, 4096u, 1u));
+}
+
+/* ---- With a constraint and a kernel step ---------------------------------------------------------------------------- */
+
+static void inside_half(void *user, const pfl_view_t *p, uint32_t *inside)
+{
+    (void)user;
+    for (uint32_t i = 0u; i < p->n; i++) {
+        inside[i] = (p->x[i] > 0.0f) ? 1u : 0u;
+    }
+}
+
+static void project_half(void *user, const pfl_batch_t *p)
+{
+    (void)user;
+    for (uint32_t i = 0u; i < p->n; i++) {
+        PFL_STATE(p, 0)[i] = fmaxf(PFL_STATE(p, 0)[i], 0.001f);
+    }
+}
+
+/* The memory of redraws moves along: what follows is what a filter of that N does that began with it. */
+void test_the_memory_of_redraws_moves_along(void)
+{
+    static const pfl_constraint_t constraint = {inside_half, project_half, NULL, 3u, 0u, pfl_constraint_keep};
+    static const uint32_t counts[] = {333u, 900u};
+    for (uint32_t k = 0u; k < 2u; k++) {
+        adaptive.most = MOST;
+        adaptive.config.constraint = &constraint;
+        pfl_t *f = start();
+        (void)ut_fly_linear(f, 1000u, 0.1f, 0u);
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_set_particles(f, &adaptive, counts[1u - k]));
+        (void)ut_fly_linear(f, 2000u, 0.1f, 0u);
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_set_particles(f, &adaptive, counts[k]));
+        const pfl_config_t config = adaptive.config;
+        const size_t bytes = pfl_arena_bytes(&config);
+        pfl_t *fresh = NULL;
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_init(ut_arena(bytes), bytes, &config, 0u, &fresh));
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_restore(fresh, ut_snapshot(f), pfl_snapshot_bytes(f)));
+        for (uint32_t step = 3u; step < 9u; step++) {
+            TEST_ASSERT_TRUE(ut_fly_linear(f, step * 1000u, 0.1f, 0u) == ut_fly_linear(fresh, step * 1000u, 0.1f, 0u));
+        }
+        pfl_health_t health;
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_health(f, &health));
+        TEST_ASSERT_TRUE(health.redrawn > 0u);
+        ut_arenas_end();
+    }
+}
+
+/* Ten particles become five hundred: copies, but for a kernel step. */
+void test_copies_are_moved_apart(void)
+{
+    static const pfl_kernel_t kernel = {0.3f, 0u, pfl_kernel_move};
+    for (uint32_t with = 0u; with < 2u; with++) {
+        pfl_view_t view;
+        uint32_t different = 0u;
+        adaptive.most = MOST;
+        adaptive.config.kernel = (with != 0u) ? &kernel : NULL;
+        pfl_t *f = start();
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_set_particles(f, &adaptive, 10u));
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_set_particles(f, &adaptive, 500u));
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_particles(f, &view, NULL));
+        for (uint32_t i = 0u; i < view.n; i++) {
+            uint32_t same = 0u;
+            for (uint32_t j = 0u; j < i; j++) {
+                same += (ut_bits(view.x[i]) == ut_bits(view.x[j])) ? 1u : 0u;
+            }
+            different += (same == 0u) ? 1u : 0u;
+        }
+        TEST_ASSERT_TRUE((with != 0u) ? (different > 490u) : (different == 10u));
+        TEST_ASSERT_TRUE(pfl_invariants_hold(f));
+    }
 }

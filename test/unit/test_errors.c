@@ -210,3 +210,11 @@ void test_drifting_states_have_their_statistics(void)
     pfl_drift_predict(&drift, NULL, 0.5f, &batch);
     TEST_ASSERT_EQUAL_FLOAT(60.0f, x[0]);
 }
+
+void test_the_mixture_counts_from_its_better_side(void)
+{
+    const pfl_mixture_law_t below = {1.0f, {0.1f, 0.02f}, 0.001f};
+    const pfl_mixture_law_t above = {1.0f, {0.02f, 0.1f}, 0.001f};
+    check_law(pfl_mixture_law, &below, mixture_reference);
+    check_law(pfl_mixture_law, &above, mixture_reference);
+}

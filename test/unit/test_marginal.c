@@ -629,3 +629,98 @@ void test_snapshot_and_covariance_together_continue_the_flight(void)
         TEST_ASSERT_EQUAL_UINT32(ut_bits(first[d]), ut_bits(again[d]));
     }
 }
+
+/* ---- One step by hand: one linear state, what is measured depends on the particle ------------------------------------ */
+
+#define HAND 21u
+enum { HAND_N, HAND_L, HAND_COV, HAND_LOGLIK, HAND_STATES };
+
+static float hand[HAND_STATES * HAND];
+
+/* z = n^2 + see l; `see` is 2, or 1 + n where it may depend on the particle. */
+static void hand_measure(void *user, uint32_t k, const pfl_view_t *p, float *h, float *see)
+{
+    (void)user;
+    (void)k;
+    for (uint32_t i = 0u; i < p->n; i++) {
+        const float n = PFL_STATE(p, HAND_N)[i];
+        h[i] = n * n;
+        if (see != NULL) {
+            see[i] = 1.0f + n;
+        }
+    }
+}
+
+static pfl_marginal_t hand_model(uint16_t measured)
+{
+    for (uint32_t i = 0u; i < HAND; i++) {
+        hand[HAND_N * HAND + i] = 0.1f * (float)(int32_t)i;
+        hand[HAND_L * HAND + i] = 0.5f - 0.02f * (float)(int32_t)i;
+        hand[HAND_COV * HAND + i] = 1.0f;
+        hand[HAND_LOGLIK * HAND + i] = 77.0f;
+    }
+    return (pfl_marginal_t){.measure = hand_measure,
+                            .linear = 1u,
+                            .mean = HAND_L,
+                            .measured = measured,
+                            .loglik_state = HAND_LOGLIK,
+                            .transition = {{0.8f}},
+                            .drift = {0.1f},
+                            .process_cov = {0.36f}, /* 0.64 + 0.36: the covariance is 1 again */
+                            .see = {{2.0f}},
+                            .see_variance = {0.25f}};
+}
+
+static void check_hand(bool each)
+{
+    for (uint32_t i = 0u; i < HAND; i++) {
+        const double n = 0.1 * (double)i;
+        const double before = 0.8 * (0.5 - 0.02 * (double)i) + 0.1;
+        const double see = each ? 1.0 + n : 2.0;
+        const double s = see * see + 0.25;
+        const double e = 1.5 - n * n - see * before;
+        const double loglik = -0.5 * (e * e / s + (each ? log(s / 0.25) : 0.0));
+        TEST_ASSERT_DOUBLE_WITHIN(1e-5, before + see / s * e, (double)hand[HAND_L * HAND + i]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-5 * (1.0 - loglik), loglik, (double)hand[HAND_LOGLIK * HAND + i]);
+        TEST_ASSERT_DOUBLE_WITHIN(1e-5, each ? 1.0 - see * see / s : 1.0, (double)hand[HAND_COV * HAND + i]);
+    }
+}
+
+void test_a_measurement_that_depends_on_the_particle(void)
+{
+    const float z[1] = {1.5f};
+    const pfl_marginal_input_t in = {NULL, z};
+    const pfl_batch_t batch = {hand, HAND, NULL, 0u, HAND};
+    pfl_marginal_shared_t shared = {.model = hand_model(1u), .cov = {1.0f}};
+    pfl_marginal_shared_step(&shared, true);
+    pfl_marginal_shared_predict(&shared, &in, 1.0f, &batch);
+    check_hand(false);
+    pfl_marginal_each_t each = {.model = hand_model(1u), .cov = HAND_COV, .work = work};
+    pfl_marginal_each_predict(&each, &in, 1.0f, &batch);
+    check_hand(true);
+}
+
+static void check_only_carried(float cov)
+{
+    for (uint32_t i = 0u; i < HAND; i++) {
+        const double carried = 0.8 * (0.5 - 0.02 * (double)i) + 0.1;
+        TEST_ASSERT_DOUBLE_WITHIN(1e-6, carried, (double)hand[HAND_L * HAND + i]);
+        TEST_ASSERT_EQUAL_FLOAT(cov, hand[HAND_COV * HAND + i]);
+        TEST_ASSERT_EQUAL_FLOAT(77.0f, hand[HAND_LOGLIK * HAND + i]); /* no state of that kind is asked for */
+    }
+}
+
+void test_a_model_that_measures_nothing_is_only_carried_on(void)
+{
+    const pfl_marginal_input_t in = {NULL, NULL};
+    const pfl_batch_t batch = {hand, HAND, NULL, 0u, HAND};
+    pfl_marginal_shared_t shared = {.model = hand_model(0u), .cov = {2.0f}};
+    pfl_marginal_shared_step(&shared, false);
+    TEST_ASSERT_FLOAT_WITHIN(1e-6f, 0.64f * 2.0f + 0.36f, shared.cov[0]);
+    pfl_marginal_shared_predict(&shared, &in, 1.0f, &batch);
+    check_only_carried(1.0f);
+    pfl_marginal_each_t each = {.model = hand_model(0u), .cov = HAND_COV, .work = work};
+    each.model.process_cov[0] = 0.11f;
+    pfl_marginal_each_predict(&each, &in, 1.0f, &batch);
+    check_only_carried(0.8f * 0.8f + 0.11f);
+}

@@ -185,3 +185,69 @@ void test_a_range_that_is_no_number_is_refused(void)
         TEST_ASSERT_LESS_THAN_UINT32(N, finite);
     }
 }
+/* Backwards and turning left: errors grow with the size of the motion. */
+void test_wheels_that_reverse_err_as_much(void)
+{
+    const pfl_odometry_input_t in = {-2.0f, 0.6f};
+    pfl_wheels_t wheels = {0.05f, 0.1f, 0.02f, 0.0f, 0.0f, 0.0f};
+    float before[STATES * N];
+    memcpy(before, x, sizeof x);
+    pfl_wheels_predict(&wheels, &in, 0.25f, &batch);
+    for (uint32_t i = 0u; i < N; i++) {
+        const double scale = (double)before[PFL_WHEELS_SCALE * N + i];
+        const double bias = (double)before[PFL_WHEELS_BIAS * N + i];
+        const double way = -0.25 * 2.0 * scale + 0.5 * 0.05 * 2.0 * (double)noise[i];
+        const double turn = 0.25 * (0.6 + bias) + 0.5 * (0.02 + 0.1 * 0.6) * (double)noise[PFL_BATCH + i];
+        const double heading = (double)before[PFL_WHEELS_HEADING * N + i];
+        TEST_ASSERT_DOUBLE_WITHIN(2e-5, heading + turn, (double)x[PFL_WHEELS_HEADING * N + i]);
+        TEST_ASSERT_DOUBLE_WITHIN(4e-4, (double)before[i] + way * cos(heading + 0.5 * turn), (double)x[i]);
+    }
+}
+
+/* The clocks go on at their drift, in the same way for both constellations. */
+void test_without_ranges_the_clocks_run_on(void)
+{
+    float before[STATES * N];
+    memcpy(before, x, sizeof x);
+    pfl_clocks_fused(&sensor);
+    pfl_clocks_predict(&sensor, NULL, 0.5f, &batch);
+    for (uint32_t i = 0u; i < N; i++) {
+        const float drift = before[(CLOCK + 2u) * N + i];
+        TEST_ASSERT_EQUAL_FLOAT(before[CLOCK * N + i] + (0.5f * drift), x[CLOCK * N + i]);
+        TEST_ASSERT_EQUAL_FLOAT(before[(CLOCK + 1u) * N + i] + (0.5f * drift), x[(CLOCK + 1u) * N + i]);
+        TEST_ASSERT_EQUAL_FLOAT(drift, x[(CLOCK + 2u) * N + i]);
+    }
+}
+
+/* Nothing is a reflection: every range pulls with its whole weight, and the share of those that might be. */
+void test_without_a_tail_all_ranges_pull_alike(void)
+{
+    float before[STATES * N];
+    memcpy(before, x, sizeof x);
+    sensor.tail_m = 0.0f;
+    sensor.gain_clock = 1.0f;
+    pfl_clocks_predict(&sensor, &ranges, 0.0f, &batch);
+    for (uint32_t i = 0u; i < N; i++) {
+        double pull[2] = {0.0, 0.0};
+        double weight[2] = {0.0, 0.0};
+        for (uint32_t k = 0u; k < 3u; k++) {
+            const uint32_t system = ranges.satellite[k].system;
+            weight[system] += 1.03;
+            pull[system] += 1.03 * fmin(fmax(error_of(before, k, i), -30.0), 30.0);
+        }
+        for (uint32_t k = 0u; k < 2u; k++) {
+            const double clock = (double)before[(CLOCK + k) * N + i] + pull[k] / (weight[k] + 1.0);
+            TEST_ASSERT_DOUBLE_WITHIN(1e-3, clock, (double)x[(CLOCK + k) * N + i]);
+        }
+    }
+}
+
+/* A line through very many points: the gains of one through 10 001. */
+void test_gains_of_a_line_stop_falling(void)
+{
+    sensor.gain = 0.0f;
+    sensor.epochs = 3000000000u;
+    pfl_clocks_fused(&sensor);
+    TEST_ASSERT_FLOAT_WITHIN(1e-9f, 2.0f * 20001.0f / (10001.0f * 10002.0f), sensor.gain_clock);
+    TEST_ASSERT_FLOAT_WITHIN(1e-12f, 6.0f / (10001.0f * 10002.0f) / 0.2f, sensor.gain_drift);
+}

@@ -138,3 +138,21 @@ void test_dead_reckoning_moves_as_its_header_says(void)
         TEST_ASSERT_EQUAL_FLOAT(biases[1], x[4u * N + i]);
     }
 }
+
+/* Without gross errors their span means nothing. */
+void test_without_gross_errors_an_echo_may_cost_anything(void)
+{
+    pfl_terrain_t s = {&grid, 0u, 1u, PFL_TERRAIN_NO_BIAS, 0u, 0.12f, 0.0f, 15.0f, 6.0f, 0.0f};
+    const pfl_view_t view = {x, N, 0u, 1u};
+    x[0] = 1000.0f; /* 100 m high, so 800 m to the ground */
+    x[N] = 500.0f;
+    for (float agl_m = 760.0f; agl_m < 830.0f; agl_m += 5.0f) {
+        const pfl_terrain_z_t z = {900.0f, agl_m, 3.0f, 1.0f};
+        float ll;
+        pfl_terrain_loglik(&s, &z, &view, &ll);
+        s.gross_span_m = 1.0f; /* the test's own division */
+        const double expected = expected_loglik(&s, &z, 100.0, 0.0);
+        s.gross_span_m = 0.0f;
+        TEST_ASSERT_DOUBLE_WITHIN(1e-4 - (1e-5 * expected), expected, (double)ll);
+    }
+}
