@@ -28,6 +28,7 @@ set(PFLIGHT_LIB_SOURCES
   auxiliary.c
   parents.c
   jump.c
+  road_network.c
   weights.c
   resample.c
   resample_schemes.c
@@ -104,6 +105,7 @@ set(PFLIGHT_LIB_HEADERS
   pseudorange.h
   range_bias.h
   rng.h
+  road_network.h
   sensors.h
   status.h
   tempered.h

@@ -8,22 +8,9 @@
 #include "parents.h"
 #include "resample.h"
 #include "rng_kernels.h"
+#include "uniform_kernel.h"
 
 /* ---- Jumps and moves ---------------------------------------------------------------------------------------------- */
-
-/* Distribution function of the standard normal, to 1e-7 (Abramowitz and Stegun 1964, 26.2.17). */
-static inline float uniform_of(float normal)
-{
-    const float x = pfl_from_bits(pfl_bits(normal) & 0x7FFFFFFF);
-    const float t = 1.0f / (1.0f + (0.2316419f * x));
-    float p = 1.330274429f;
-    p = (p * t) - 1.821255978f;
-    p = (p * t) + 1.781477937f;
-    p = (p * t) - 0.356563782f;
-    p = (p * t) + 0.319381530f;
-    const float tail = (p * t) * (0.398942280f * pfl_exp_kernel(-0.5f * (x * x)));
-    return pfl_select(pfl_bits(normal) >> 31, tail, 1.0f - tail);
-}
 
 /* Upper ends of the intervals of [0, 1) that lead from regime i to 0, 1, ...; what is above all of them stays. */
 static void ends_of(const pfl_jump_t *m, uint32_t i, float dt_s, float *ends)
@@ -57,7 +44,7 @@ static void jump(const pfl_jump_t *m, float dt_s, const pfl_batch_t *p)
     }
     for (uint32_t k = 0u; k < p->n; k++) {
         const uint32_t from = regime_of(number[k], m->regimes);
-        const float u = uniform_of(normal[k]);
+        const float u = pfl_uniform_kernel(normal[k]);
         uint32_t to = 0u;
         while ((to < m->regimes) && (u >= ends[from][to])) {
             to++;

@@ -417,6 +417,25 @@ static void of_range_bias(void)
     of_sensor("sensor-range-bias", pfl_range_bias_loglik, &biases, &range);
 }
 
+static void of_roads(void)
+{
+    static pfl_road_node_t node[4] = {
+        {0.0f, 0.0f, 0u, 0u}, {7.0f, 1.0f, 0u, 0u}, {6.0f, 8.0f, 0u, 0u}, {-1.5f, 6.0f, 0u, 0u}};
+    static pfl_road_edge_t edge[8] = {{.from = 0u, .to = 1u}, {.from = 0u, .to = 2u}, {.from = 0u, .to = 3u},
+                                      {.from = 1u, .to = 0u}, {.from = 1u, .to = 2u}, {.from = 2u, .to = 3u},
+                                      {.from = 3u, .to = 0u}, {.from = 3u, .to = 2u}};
+    static const pfl_road_graph_t graph = {node, edge, 4u, 8u};
+    static pfl_road_network_t network = {&graph, {4.0f, 3.0f, 1.0f, 9.0f, 2.0f, 1.0f, 2.5f, 0.1f}};
+    begin(81u);
+    mix((float)pfl_road_prepare(&graph));
+    scatter(3.0f, 9.0f);
+    const pfl_batch_t all = batch(N);
+    pfl_road_put(&graph, 1.5f, &all);
+    mix_cloud();
+    end("road-put");
+    of_model("model-road-network", pfl_road_network_predict, &network, NULL, 2.0f, 5.0f);
+}
+
 void of_modules(void)
 {
     of_models();
@@ -432,4 +451,5 @@ void of_modules(void)
     of_flights();
     of_pseudoranges();
     of_range_bias();
+    of_roads();
 }

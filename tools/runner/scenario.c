@@ -7,6 +7,7 @@
 #include "land_vehicle.h"
 #include "manoeuvre.h"
 #include "replay.h"
+#include "road_network.h"
 #include "sharp.h"
 #include "standoff.h"
 #include "terrain.h"
@@ -19,10 +20,10 @@
 #include <stdlib.h>
 #include <string.h>
 
-const scenario_t *const all_scenarios[] = {&land_vehicle_scenario,   &uwb_range_scenario, &standoff_scenario,
-                                           &uav_trajectory_scenario, &gps_scenario,       &wind_scenario,
-                                           &gps_fault_scenario,      &car_scenario,       &terrain_scenario,
-                                           &sharp_scenario,          &manoeuvre_scenario, &replay_scenario};
+const scenario_t *const all_scenarios[] = {
+    &land_vehicle_scenario, &uwb_range_scenario,    &standoff_scenario, &uav_trajectory_scenario, &gps_scenario,
+    &wind_scenario,         &gps_fault_scenario,    &car_scenario,      &terrain_scenario,        &sharp_scenario,
+    &manoeuvre_scenario,    &road_network_scenario, &replay_scenario};
 const size_t all_scenarios_count = sizeof all_scenarios / sizeof all_scenarios[0];
 
 const scenario_t *scenario_find(const char *name)

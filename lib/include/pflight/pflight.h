@@ -22,6 +22,7 @@
 #include "pflight/range_bias.h"
 #include "pflight/regularised.h"
 #include "pflight/rng.h"
+#include "pflight/road_network.h"
 #include "pflight/sensors.h"
 #include "pflight/status.h"
 #include "pflight/tempered.h"
