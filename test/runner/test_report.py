@@ -336,6 +336,7 @@ class Report(unittest.TestCase):
         "wind": ["wind-px4", "offset-px4", "wind-x8", "offset-x8"],
         "gps-fault": ["height", "flag"],
         "car": ["track", "error"],
+        "road-network": ["track", "error"],
     }
 
     def test_page_is_sound_and_self_contained(self):

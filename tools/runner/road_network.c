@@ -155,6 +155,10 @@ static figure_t root_of(figure_t square)
     return (figure_t){root, square.error / (2.0 * root)};
 }
 
+/* The better of the two filters without streets times this. Over 16 seeds of 100 runs the ratios are 0.67, 0.68 and 0.72
+ * with standard deviations of 0.03, so that a series fails by chance once in 40 000 or less often. */
+static const double shares[SQUARE_END + 1] = {0.8, 0.85, 0.85};
+
 static void judge(const plan_t *plan, table_t runs, verdict_t *verdict)
 {
     static char labels[FIGURES * ROAD_FILTERS][32];
@@ -163,7 +167,7 @@ static void judge(const plan_t *plan, table_t runs, verdict_t *verdict)
         own->study.particles == JUDGED_PARTICLES && runs.n >= JUDGED_RUNS && fabs(own->study.accel - 1.5) < 1e-6;
 
     for (int where = 0; where < FIGURES; where++) {
-        double rival = INFINITY; /* the better of those without streets */
+        double rival = INFINITY;
         for (int k = 0; k < ROAD_FILTERS; k++) {
             char *label = labels[where * ROAD_FILTERS + k];
             const figure_t mean = stats_mean(runs, (size_t)(FIGURES * k + where));
@@ -173,14 +177,22 @@ static void judge(const plan_t *plan, table_t runs, verdict_t *verdict)
             rival = k == ROAD_FREE || k == ROAD_ANNULUS ? fmin(rival, figure.mean) : rival;
             if (judged && k == ROAD_TWO && where <= SQUARE_END) {
                 metric->lo = 0.0;
-                metric->hi = 0.8 * rival;
+                metric->hi = shares[where] * rival;
             }
         }
     }
-    verdict_add(verdict, "vehicle_told", stats_mean(runs, TOLD));
-    text_add(&verdict->notes,
-             "free: constant velocity; annulus: kept to the annulus that holds all streets, as in standoff; "
-             "one, two: on the streets, by one model of a vehicle and by two.\n");
+    metric_t *told = verdict_add(verdict, "vehicle_told", stats_mean(runs, TOLD));
+    if (judged) {
+        told->lo = 0.8; /* 0.93 with a deviation of 0.03 in 100 runs */
+        told->hi = 1.0;
+    }
+    text_add(
+        &verdict->notes,
+        "free: constant velocity; annulus: kept to the annulus that holds all streets, as in standoff; one, two: on "
+        "the streets, by one model of a vehicle and by two. out, end: in the two outages of 10 s, and at their last "
+        "steps; again: until the error is below 10 m after them; lost: out of the camera's view at their ends.\n"
+        "Acceptance: two has at most 0.8 of the better error of free and annulus, 0.85 in the outages and at "
+        "their ends, and tells car from lorry in 0.8 of the runs.\n");
 }
 
 static bool open_study(const study_t *study, plan_t *plan, failure_t *failure)
