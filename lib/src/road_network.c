@@ -47,30 +47,39 @@ static bool enter(const pfl_road_graph_t *g, uint32_t k, uint32_t before)
     return (node->ways <= PFL_ROAD_WAYS_MAX) && measure(g, e);
 }
 
+/* Edges into their nodes, one after the other. */
+static bool enter_all(const pfl_road_graph_t *g)
+{
+    uint32_t before = 0u;
+    for (uint32_t k = 0u; k < g->nodes; k++) {
+        g->node[k].first = 0u;
+        g->node[k].ways = 0u;
+    }
+    for (uint32_t k = 0u; k < g->edges; k++) {
+        if (!enter(g, k, before)) {
+            return false;
+        }
+        before = g->edge[k].from;
+    }
+    return true;
+}
+
+static bool is_left(const pfl_road_graph_t *g)
+{
+    uint32_t left = 0u; /* nodes with a way out */
+    for (uint32_t k = 0u; k < g->nodes; k++) {
+        left += (g->node[k].ways != 0u) ? 1u : 0u;
+    }
+    return left == g->nodes;
+}
+
 pfl_status_t pfl_road_prepare(const pfl_road_graph_t *graph)
 {
     if ((graph == NULL) || (graph->node == NULL) || (graph->edge == NULL)) {
         return PFL_ERR_ARG;
     }
-    if ((graph->nodes == 0u) || (graph->edges < graph->nodes) || (graph->edges > PFL_ROAD_EDGES_MAX)) {
-        return PFL_ERR_CONFIG;
-    }
-    for (uint32_t k = 0u; k < graph->nodes; k++) {
-        graph->node[k].first = 0u;
-        graph->node[k].ways = 0u;
-    }
-    uint32_t before = 0u;
-    for (uint32_t k = 0u; k < graph->edges; k++) {
-        if (!enter(graph, k, before)) {
-            return PFL_ERR_CONFIG;
-        }
-        before = graph->edge[k].from;
-    }
-    uint32_t left = 0u; /* nodes with a way out */
-    for (uint32_t k = 0u; k < graph->nodes; k++) {
-        left += (graph->node[k].ways != 0u) ? 1u : 0u;
-    }
-    return (left == graph->nodes) ? PFL_OK : PFL_ERR_CONFIG;
+    const bool counted = (graph->nodes > 0u) && (graph->edges >= graph->nodes) && (graph->edges <= PFL_ROAD_EDGES_MAX);
+    return (counted && enter_all(graph) && is_left(graph)) ? PFL_OK : PFL_ERR_CONFIG;
 }
 
 /* ---- Places on it --------------------------------------------------------------------------------------------------- */

@@ -181,40 +181,46 @@ void test_a_step_passes_no_more_nodes_than_it_may(void)
     TEST_ASSERT_EQUAL_FLOAT(0.0f, state(PFL_ROAD_X, 0u));
 }
 
-/* Arrived at the middle from the west, ahead 3 : left 1 : right 1 and never back; the second choice, of those that pass a
- * node more, is as free as the first. 51 200 particles, each share to 5.5 standard deviations (4e-8). */
-void test_the_odds_at_a_junction(void)
+/* 51 200 particles from the western arm for dt_s: how many are on each edge then. */
+static void count_edges(float dt_s, double *count)
 {
-    double first[EDGES] = {0.0};
-    double second[2] = {0.0};
-    const uint32_t all = 400u * PFL_BATCH;
-    pfl_rng_seed(&rng, 11u);
-    network.vehicle.sigma_mps = 0.0f;
-    network.vehicle.corner_mps = 30.0f;
-    network.vehicle.back = 3.0f; /* behind the middle: at the eastern end back 3, slanted 1 */
-    for (uint32_t round = 0u; round < 800u; round++) {
-        const pfl_batch_t b = batch_of(PFL_BATCH);
-        const float dt_s = (round < 400u) ? 0.5f : 10.4f;
+    const pfl_batch_t b = batch_of(PFL_BATCH);
+    for (uint32_t round = 0u; round < 400u; round++) {
         for (uint32_t i = 0u; i < PFL_BATCH; i++) {
             place(i, FROM_WEST, 98.0f, 10.0f);
         }
         pfl_rng_normals(&rng, noise, 4u * PFL_BATCH / 16u);
         pfl_road_network_predict(&network, NULL, dt_s, &b);
         for (uint32_t i = 0u; i < PFL_BATCH; i++) {
-            const uint32_t k = (uint32_t)state(PFL_ROAD_EDGE, i);
-            first[k] += (round < 400u) ? 1.0 : 0.0;
-            second[0] += (round >= 400u && k == FROM_EAST) ? 1.0 : 0.0;
-            second[1] += (round >= 400u && k == SLANT) ? 1.0 : 0.0;
+            count[(uint32_t)state(PFL_ROAD_EDGE, i)] += 1.0;
         }
     }
-    const double odds[4] = {0.375, 0.125, 0.375, 0.125}; /* ahead, left, back, right, of 8 */
-    for (uint32_t k = 0u; k < 4u; k++) {
-        TEST_ASSERT_DOUBLE_WITHIN(5.5 * sqrt(odds[k] * (1.0 - odds[k]) / all), odds[k], first[k] / all);
-    }
-    const double share[2] = {0.375 * 0.75, 0.375 * 0.25};
-    for (uint32_t k = 0u; k < 2u; k++) {
-        TEST_ASSERT_DOUBLE_WITHIN(5.5 * sqrt(share[k] * (1.0 - share[k]) / all), share[k], second[k] / all);
-    }
+}
+
+static void expect_share(double share, double count)
+{
+    const double all = 400.0 * (double)PFL_BATCH;
+    TEST_ASSERT_DOUBLE_WITHIN(5.5 * sqrt(share * (1.0 - share) / all), share, count / all);
+}
+
+/* Arrived at the middle from the west: ahead 3, left 1, back 3, right 1. Those that went ahead come to the eastern end in a
+ * longer step, back 3, slanted 1: their second choice is as free as the first. To 5.5 standard deviations (4e-8 each). */
+void test_the_odds_at_a_junction(void)
+{
+    double count[EDGES] = {0.0};
+    pfl_rng_seed(&rng, 11u);
+    network.vehicle.sigma_mps = 0.0f;
+    network.vehicle.corner_mps = 30.0f;
+    network.vehicle.back = 3.0f;
+    count_edges(0.5f, count);
+    expect_share(0.375, count[TO_EAST]);
+    expect_share(0.125, count[TO_NORTH]);
+    expect_share(0.375, count[TO_WEST]);
+    expect_share(0.125, count[TO_SOUTH]);
+    memset(count, 0, sizeof count);
+    count_edges(10.4f, count);
+    expect_share(0.375 * 0.75, count[FROM_EAST]);
+    expect_share(0.375 * 0.25, count[SLANT]);
 }
 
 /* Whatever the state: edge numbers beyond the graph, NaN, places and speeds of any size. */

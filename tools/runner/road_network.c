@@ -53,24 +53,33 @@ static bool out_of_view(const standoff_belief_t *b, const double *target, const 
     return fabs(remainder(truth - axis, 6.283185307179586)) > VIEW_HALF_RAD;
 }
 
-/* value: FIGURES of one filter. */
+static void record_outage(double error, bool last, bool lost, double *value)
+{
+    value[SQUARE_OUT] += error * error / (double)STANDOFF_OUT_STEPS;
+    if (last) {
+        value[SQUARE_END] += error * error / (double)OUTAGES;
+        value[LOST] += lost ? 1.0 / (double)OUTAGES : 0.0;
+    }
+}
+
+/* value: FIGURES of one filter. looking: for the target after an outage. */
 static void record(const standoff_belief_t *b, const double *target, const standoff_uav_t *uav, double wanted_m,
                    unsigned k, bool *looking, double *value)
 {
     const double error = hypot(b->target[TARGET_X] - target[TARGET_X], b->target[TARGET_Y] - target[TARGET_Y]);
     const double distance = hypot(uav->x_m - target[TARGET_X], uav->y_m - target[TARGET_Y]);
-    const bool out = standoff_is_out(k);
-    const bool last = out && !standoff_is_out(k + 1u);
 
     if (k > SETTLED) {
         value[SQUARE] += error * error / (double)(STANDOFF_STEPS - SETTLED);
         value[DISTANCE] += fabs(distance - wanted_m) / (double)(STANDOFF_STEPS - SETTLED);
     }
-    value[SQUARE_OUT] += out ? error * error / (double)STANDOFF_OUT_STEPS : 0.0;
-    value[SQUARE_END] += last ? error * error / (double)OUTAGES : 0.0;
-    value[LOST] += last && out_of_view(b, target, uav) ? 1.0 / (double)OUTAGES : 0.0;
-    *looking = (*looking || out) && (out || error > FOUND_M);
-    value[AGAIN] += *looking && !out ? STANDOFF_PERIOD_S / (double)OUTAGES : 0.0;
+    if (standoff_is_out(k)) {
+        record_outage(error, !standoff_is_out(k + 1u), out_of_view(b, target, uav), value);
+        *looking = true;
+    } else {
+        *looking = *looking && error > FOUND_M;
+        value[AGAIN] += *looking ? STANDOFF_PERIOD_S / (double)OUTAGES : 0.0;
+    }
 }
 
 static void note(const standoff_belief_t *b, const double *target, const standoff_uav_t *uav, road_filter_kind_t kind,
@@ -167,18 +176,18 @@ static void judge(const plan_t *plan, table_t runs, verdict_t *verdict)
         own->study.particles == JUDGED_PARTICLES && runs.n >= JUDGED_RUNS && fabs(own->study.accel - 1.5) < 1e-6;
 
     for (int where = 0; where < FIGURES; where++) {
-        double rival = INFINITY;
+        figure_t figure[ROAD_FILTERS];
+        metric_t *metric = NULL;
         for (int k = 0; k < ROAD_FILTERS; k++) {
             char *label = labels[where * ROAD_FILTERS + k];
             const figure_t mean = stats_mean(runs, (size_t)(FIGURES * k + where));
-            const figure_t figure = where <= SQUARE_END ? root_of(mean) : mean;
+            figure[k] = where <= SQUARE_END ? root_of(mean) : mean;
             (void)snprintf(label, sizeof labels[0], "%s_%s", wheres[where], names[k]);
-            metric_t *metric = verdict_add(verdict, label, figure);
-            rival = k == ROAD_FREE || k == ROAD_ANNULUS ? fmin(rival, figure.mean) : rival;
-            if (judged && k == ROAD_TWO && where <= SQUARE_END) {
-                metric->lo = 0.0;
-                metric->hi = shares[where] * rival;
-            }
+            metric = verdict_add(verdict, label, figure[k]);
+        }
+        if (judged && where <= SQUARE_END) { /* the last of the filters, against the better of those without streets */
+            metric->lo = 0.0;
+            metric->hi = shares[where] * fmin(figure[ROAD_FREE].mean, figure[ROAD_ANNULUS].mean);
         }
     }
     metric_t *told = verdict_add(verdict, "vehicle_told", stats_mean(runs, TOLD));
