@@ -84,7 +84,7 @@ static bool take_events(fault_study_t *s, const recording_t *gps, const recordin
         return fail(failure, EXIT_HARNESS, "out of memory");
     }
     s->base_m = baro->value[1];
-    s->onset_s = INFINITY;
+    s->onset_s = (double)INFINITY;
     for (size_t i = 0u; i < gps->rows; i++) {
         take_fix(s, &gps->value[i * gps->columns], baro);
     }
@@ -257,7 +257,7 @@ static bool cycle(pfl_t *f, const fault_study_t *s, size_t i, watched_t *w, run_
 
 static bool fly(pfl_t *f, const fault_study_t *s, run_output_t *out, failure_t *failure)
 {
-    watched_t w = {.first_flag_s = INFINITY, .jump_flag_s = INFINITY};
+    watched_t w = {.first_flag_s = (double)INFINITY, .jump_flag_s = (double)INFINITY};
     double fixes = 0.0;
 
     for (size_t i = 0u; i < s->events; i++) {
