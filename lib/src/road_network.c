@@ -168,7 +168,7 @@ void pfl_road_network_predict(void *user, const void *u, float dt_s, const pfl_b
         const float speed = PFL_STATE(p, PFL_ROAD_SPEED)[i];
         const float next = v.cruise_mps + ((keep * (speed - v.cruise_mps)) + (spread * w_speed[i]));
         on_road_t at = {edge_of(m->graph, PFL_STATE(p, PFL_ROAD_EDGE)[i]), PFL_STATE(p, PFL_ROAD_ALONG)[i],
-                      clip(next, 0.0f, v.speed_max_mps)};
+                        clip(next, 0.0f, v.speed_max_mps)};
         at.along_m += (0.5f * dt_s) * (speed + at.speed_mps);
         follow(m, pfl_uniform_kernel(w_way[i]), &at);
         write(m->graph, &at, i, p);
