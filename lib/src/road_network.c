@@ -87,7 +87,7 @@ pfl_status_t pfl_road_prepare(const pfl_road_graph_t *graph)
 typedef struct {
     uint32_t edge;
     float along_m, speed_mps;
-} place_t;
+} on_road_t;
 
 static inline uint32_t edge_of(const pfl_road_graph_t *g, float number)
 {
@@ -95,7 +95,7 @@ static inline uint32_t edge_of(const pfl_road_graph_t *g, float number)
     return (uint32_t)(int32_t)(clip(low, 0.0f, (float)(int32_t)(g->edges - 1u)) + 0.5f);
 }
 
-static void write(const pfl_road_graph_t *g, const place_t *at, uint32_t i, const pfl_batch_t *p)
+static void write(const pfl_road_graph_t *g, const on_road_t *at, uint32_t i, const pfl_batch_t *p)
 {
     const pfl_road_edge_t *e = &g->edge[at->edge];
     PFL_STATE(p, PFL_ROAD_EDGE)[i] = (float)(int32_t)at->edge;
@@ -142,7 +142,7 @@ static uint32_t choose(const pfl_road_network_t *m, uint32_t edge, float *u)
     return node->first + way;
 }
 
-static void follow(const pfl_road_network_t *m, float u, place_t *at)
+static void follow(const pfl_road_network_t *m, float u, on_road_t *at)
 {
     const pfl_road_edge_t *edge = m->graph->edge;
     for (uint32_t k = 0u; (k < PFL_ROAD_CROSSINGS_MAX) && (at->along_m >= edge[at->edge].length_m); k++) {
@@ -167,8 +167,8 @@ void pfl_road_network_predict(void *user, const void *u, float dt_s, const pfl_b
     for (uint32_t i = 0u; i < p->n; i++) {
         const float speed = PFL_STATE(p, PFL_ROAD_SPEED)[i];
         const float next = v.cruise_mps + ((keep * (speed - v.cruise_mps)) + (spread * w_speed[i]));
-        place_t at = {edge_of(m->graph, PFL_STATE(p, PFL_ROAD_EDGE)[i]), PFL_STATE(p, PFL_ROAD_ALONG)[i],
-                      clip(next, 0.0f, v.speed_max_mps)};
+        on_road_t at = {edge_of(m->graph, PFL_STATE(p, PFL_ROAD_EDGE)[i]), PFL_STATE(p, PFL_ROAD_ALONG)[i],
+                        clip(next, 0.0f, v.speed_max_mps)};
         at.along_m += (0.5f * dt_s) * (speed + at.speed_mps);
         follow(m, pfl_uniform_kernel(w_way[i]), &at);
         write(m->graph, &at, i, p);
@@ -184,7 +184,7 @@ void pfl_road_put(const pfl_road_graph_t *graph, float against_s, const pfl_batc
         const float y = PFL_STATE(p, PFL_ROAD_Y)[i];
         const float vx = PFL_STATE(p, PFL_ROAD_VX)[i];
         const float vy = PFL_STATE(p, PFL_ROAD_VY)[i];
-        place_t best = {0u, 0.0f * (x + y), 0.0f}; /* what is not finite stays so */
+        on_road_t best = {0u, 0.0f * (x + y), 0.0f}; /* what is not finite stays so */
         float least = FLT_MAX;
         for (uint32_t k = 0u; k < graph->edges; k++) {
             const pfl_road_edge_t *e = &graph->edge[k];
@@ -198,7 +198,7 @@ void pfl_road_put(const pfl_road_graph_t *graph, float against_s, const pfl_batc
             const float far = ((off_x * off_x) + (off_y * off_y)) + (against * against);
             if (far < least) {
                 least = far;
-                best = (place_t){k, along, clip(speed, 0.0f, FLT_MAX)};
+                best = (on_road_t){k, along, clip(speed, 0.0f, FLT_MAX)};
             }
         }
         write(graph, &best, i, p);
