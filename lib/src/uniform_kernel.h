@@ -16,7 +16,7 @@ static inline float pfl_uniform_kernel(float normal)
     p = (p * t) - 0.356563782f;
     p = (p * t) + 0.319381530f;
     const float tail = (p * t) * (0.398942280f * pfl_exp_kernel(-0.5f * (x * x)));
-    return pfl_select(pfl_bits(normal) >> 31, tail, 1.0f - tail);
+    return pfl_select(-(int32_t)(pfl_bits(normal) < 0), tail, 1.0f - tail);
 }
 
 #endif
