@@ -340,7 +340,7 @@ static bool check_scopes(const cli_t *cli, const bool *given, failure_t *failure
 static bool take_option(cli_t *cli, const char *word, const char *value, bool *given, failure_t *failure)
 {
     option_id_t id = OPTION_SET;
-    const bool setting = is_setting(cli, word);
+    const bool setting = strcmp(word, "--set") != 0 && is_setting(cli, word); /* uwb-range has a setting `set` */
 
     if (!setting && !find_option(word, &id, failure)) {
         return false;

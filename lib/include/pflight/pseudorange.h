@@ -22,9 +22,10 @@
 extern "C" {
 #endif
 
-#define PFL_SATELLITES_MAX 32u
-#define PFL_CLOCK_STATES 3u /* clock of constellation 0 and of 1 [m], drift of both [m/s] */
+#define PFL_SATELLITES_MAX 32u /* of an epoch */
+#define PFL_CLOCK_STATES 3u    /* clock of constellation 0 and of 1 [m], drift of both [m/s] */
 
+/* One satellite of an epoch. */
 typedef struct {
     float ux, uy;    /* unit vector from the point of reference to the satellite, its part in the plane */
     float range_m;   /* measured, less the reference's distance and the nominal clock */
@@ -32,11 +33,13 @@ typedef struct {
     uint32_t system; /* constellation, 0 or 1 */
 } pfl_satellite_t;
 
+/* An epoch, the measurement z. */
 typedef struct {
     uint32_t count; /* <= PFL_SATELLITES_MAX */
     pfl_satellite_t satellite[PFL_SATELLITES_MAX];
 } pfl_pseudoranges_t;
 
+/* The sensor: states, noise, clocks. */
 typedef struct {
     uint16_t x_state, y_state;
     uint16_t

@@ -17,6 +17,7 @@ extern "C" {
 
 #define PFL_RANGE_BIAS_MAX 8u /* anchors */
 
+/* The sensor: states, noise, what is known of the biases. */
 typedef struct {
     uint16_t x_state, y_state;
     uint16_t bias_state;                   /* of anchor 0; start them at the prior's mean */
@@ -28,6 +29,7 @@ typedef struct {
     float gain;                            /* of what was fused last; owned by the calls below */
 } pfl_range_bias_t;
 
+/* One range, the measurement z. */
 typedef struct {
     float anchor_x_m, anchor_y_m;
     float height_m; /* of the anchor over the particle's plane, or under it */

@@ -15,7 +15,7 @@ extern "C" {
 
 #define PFL_ROAD_WAYS_MAX 8u      /* edges that begin at one node */
 #define PFL_ROAD_CROSSINGS_MAX 4u /* nodes passed in one step; a particle that would pass more waits at the next one */
-#define PFL_ROAD_EDGES_MAX 1048576u
+#define PFL_ROAD_EDGES_MAX 1048576u /* edges of a graph: their numbers are floats in particles */
 
 /* States. The first three are the particle's, the others follow from them: what sensors, estimates and guidance want. */
 enum {
