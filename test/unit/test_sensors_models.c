@@ -316,17 +316,18 @@ void test_no_sensor_gives_more_than_zero(void)
 
 /* ---- Measurements that are no numbers ----------------------------------------------------------------------------- */
 
-/* Each float of z in turn is a NaN of either sign or an infinity: not every log-likelihood is finite then, so that the
+#define Z_WORDS 5u
+
+/* Each of the first floats of z in turn is a NaN of either sign or an infinity: not every log-likelihood is finite then, so that the
  * update is refused. */
 static void is_refused(pfl_loglik_fn loglik, void *user, const float *z, uint32_t words, const float *bad,
                        uint32_t kinds)
 {
     static const pfl_view_t all = {x, STRIDE, 0u, N};
-    float seen[40];
-    TEST_ASSERT_LESS_OR_EQUAL_UINT32(40u, words);
+    float seen[Z_WORDS];
     for (uint32_t k = 0u; k < (words * kinds); k++) {
         uint32_t finite = 0u;
-        memcpy(seen, z, sizeof(float) * words);
+        memcpy(seen, z, sizeof(float) * Z_WORDS);
         seen[k / kinds] = bad[k % kinds];
         loglik(user, seen, &all, ll);
         for (uint32_t i = 0u; i < N; i++) {
@@ -339,8 +340,8 @@ static void is_refused(pfl_loglik_fn loglik, void *user, const float *z, uint32_
 void test_measurements_that_are_no_numbers_are_refused(void)
 {
     const float bad[4] = {NAN, -NAN, INFINITY, -INFINITY};
-    static const float range_z[5] = {3.0f, -4.0f, 1.0f, 12.0f, 1.0f}; /* a pfl_range_z_t */
-    static const float at[3] = {1.0f, 2.0f, 3.0f};
+    static const float range_z[Z_WORDS] = {3.0f, -4.0f, 1.0f, 12.0f, 1.0f}; /* a pfl_range_z_t */
+    static const float at[Z_WORDS] = {1.0f, 2.0f, 3.0f};
     pfl_position_t position = {3u, {0u, 1u, 2u, 0u}, {1.0f, 2.0f, 0.5f, 0.0f}};
     pfl_range_t gauss = {1u, 4u, 2.0f, 0.0f};
     pfl_range_t student = {1u, 4u, 2.0f, 3.0f};
