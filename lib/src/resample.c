@@ -322,6 +322,9 @@ PFL_NOINLINE static void copy_surplus(pfl_t *f)
         pfl_store_u32(&f->scratch[i], 1u); /* padding stays as it is */
     }
     const moves_t moves = list_moves(f->scratch, f->log_weight, count);
+    if ((moves.slots + moves.parents) > f->config->particles) {
+        return; /* damaged counts: the lists may have run into each other, and hold the padding */
+    }
     const uint32_t states = f->config->states;
     const uint32_t near = (states > 1u) ? 1u : 0u;
     const uint32_t far = (states > 3u) ? 2u : (states - 1u - near);
