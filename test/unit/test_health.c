@@ -396,6 +396,29 @@ void test_any_flipped_bit_of_the_control_block_its_copy_or_its_seal_is_mended(vo
     TEST_ASSERT_EQUAL_UINT32(0u, health_of(a).mended);
 }
 
+/* Two words with the same bit flipped: a sum of products would lose the top ones against each other. */
+void test_the_same_bit_flipped_in_any_two_words_of_the_block_is_mended(void)
+{
+    static const uint32_t places[] = {0u, 18u, 30u, 31u}; /* of the word; the rotation brings bit 18 to the top */
+    watched_t w;
+    make_watched(&w);
+    pfl_t *a = ut_filter(&w.config);
+    pfl_t *b = ut_filter(&w.config);
+    const size_t words = offsetof(struct pfl, seal) / 4u;
+    uint32_t flips = 0u;
+    for (size_t one = 0u; one < words; one++) {
+        for (size_t other = one + 1u; other < words; other++) {
+            const size_t place = places[flips % 4u];
+            flip(b, (32u * one) + place);
+            flip(b, (32u * other) + place);
+            flips++;
+            TEST_ASSERT_TRUE_MESSAGE(twins_agree(a, b), "two flipped bits changed an answer");
+        }
+    }
+    TEST_ASSERT_TRUE(health_of(b).mended >= flips);
+    TEST_ASSERT_EQUAL_UINT32(0u, health_of(a).mended);
+}
+
 void test_a_block_beyond_repair_is_corrupt(void)
 {
     watched_t w;

@@ -5,8 +5,11 @@
 #include "soak.h"
 
 #include <inttypes.h>
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
+#include <sys/types.h>
+#include <sys/wait.h>
 #include <unistd.h>
 
 #define SECONDS_A_RUN 20u /* a run takes milliseconds: longer is a hang, and SIGALRM ends the process */
@@ -27,12 +30,30 @@ static void print_run(uint64_t run_seed, const judgement_t *j)
     (void)fflush(stdout);
 }
 
+/* Each run in a process of its own, so that what a fault leaves behind in memory is of no other run. The first that does
+ * not end as it should ends this process in the same way. */
 static int fly_runs(uint64_t first, uint64_t count)
 {
     for (uint64_t k = 0u; k < count; k++) {
-        (void)alarm(SECONDS_A_RUN);
-        const judgement_t j = judge_run(first + k, NULL);
-        print_run(first + k, &j);
+        const pid_t child = fork();
+        if (child == 0) {
+            (void)alarm(SECONDS_A_RUN);
+            const judgement_t j = judge_run(first + k, NULL);
+            print_run(first + k, &j);
+            _exit(0);
+        }
+        int status = 0;
+        if ((child < 0) || (waitpid(child, &status, 0) != child)) {
+            fprintf(stderr, "pflight_survival: no process for a run\n");
+            return 1;
+        }
+        if (WIFSIGNALED(status)) {
+            (void)signal(WTERMSIG(status), SIG_DFL);
+            (void)raise(WTERMSIG(status));
+        }
+        if (WEXITSTATUS(status) != 0) {
+            return WEXITSTATUS(status);
+        }
     }
     return 0;
 }
