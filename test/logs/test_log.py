@@ -248,6 +248,30 @@ class Replay(unittest.TestCase):
         self.assertIn("no column 'east_m'", done.stderr)
         self.assertIn("the sensor gps needs gps.csv", done.stderr)
 
+    def test_behind_a_gap_a_flight_of_its_own_begins(self):
+        """Two minutes later and two kilometres away; the same in C and Python, and a lost filter when it may not."""
+        import pflight
+        folder = self.folder / "pause"
+        folder.mkdir(exist_ok=True)
+        lines = (self.log / "gps.csv").read_text().splitlines()
+        head = lines[0].split(",")
+        rows = [line.split(",") for line in lines[1:]]
+        for row in rows[70:]:
+            row[0] = f"{float(row[0]) + 120:.6f}"
+            row[head.index("north_m")] = f"{float(row[head.index('north_m')]) + 2000:.6f}"
+        (folder / "gps.csv").write_text("\n".join([lines[0], *(",".join(row) for row in rows)]) + "\n")
+        for model, sensors in [("cv", "gps,velocity"), ("turn", "gps"), ("hover", "gps,height")]:
+            found = {}
+            for gap in (60, 0):
+                done = tool("run", "replay", "--data", folder, "--runs", 1, "--model", model, "--sensors", sensors, "--gap", gap,
+                            "--motion", 6, "--json", "-")
+                host = found[gap] = json.loads(done.stdout)
+                mine = pflight.replay.fly(folder, model=model, sensors=tuple(sensors.split(",")), gap=gap, motion=6.0)
+                self.assertEqual(f"{mine.hash:016x}", host["hash"], f"{model} {sensors} gap {gap}")
+                self.assertEqual(host["metrics"]["restarts"]["mean"], 1 if gap else 0)
+            self.assertLess(found[60]["metrics"]["innovation_m"]["mean"], 4.0)
+            self.assertGreater(found[0]["metrics"]["innovation_m"]["mean"], 100.0)  # so there is something to be gained
+
     def test_empty_cells_are_no_measurements(self):
         folder = self.folder / "gaps"
         folder.mkdir(exist_ok=True)

@@ -26,6 +26,7 @@ static const setting_t settings[] = {
     {"ess", NULL, 0.0, 1.0, "0.5", "resample below this share of the particles"},
     {"gate", NULL, 0.0, 1000.0, "0", "refuse a measurement whose -2 log-likelihood is above that; 0: none"},
     {"from", NULL, 0.0, 1e6, "10", "score from this time after the first measurement [s]"},
+    {"gap", NULL, 0.0, 1e6, "60", "start anew after so long without a measurement [s]; 0: never"},
 };
 
 static const char *const columns[REPLAY_COLUMNS] = {
@@ -102,6 +103,7 @@ static bool open_study(const study_t *study, plan_t *plan, failure_t *failure)
     s->anchors_over_m = (float)study_number(study, "anchors_over");
     s->gate = (float)study_number(study, "gate");
     s->from_s = study_number(study, "from");
+    s->gap_s = study_number(study, "gap");
     s->particles = study->particles;
     s->seed = study->seed;
     if (!can_see(s, failure) || !replay_load(s, study->data, failure)) {

@@ -42,6 +42,7 @@ typedef struct {
     float ess_ratio, gate;
     float range_dof, anchors_over_m;
     double from_s; /* scored from then on */
+    double gap_s;  /* without measurements, behind which the filter starts anew; 0: never */
     replay_event_t *event;
     size_t events;
     const char *compared; /* the file of the truth, or of what else the position is compared with; null: none */
@@ -55,8 +56,8 @@ extern const scenario_t replay_scenario;
  * east: east and north. */
 bool replay_load(replay_study_t *s, const char *data, failure_t *failure);
 
-/* Index of the first event of this sensor; s->events without one. */
-size_t replay_first(const replay_study_t *s, replay_sensor_t sensor);
+/* Index of this sensor's first event that is not before `from`; s->events without one. */
+size_t replay_first(const replay_study_t *s, replay_sensor_t sensor, size_t from);
 bool replay_is_position(replay_sensor_t sensor);
 
 /* Flies the filter over the log. */
@@ -69,6 +70,7 @@ enum {
     REPLAY_ERROR,      /* rms against truth */
     REPLAY_NEES,
     REPLAY_REJECTED,
+    REPLAY_RESTARTS,
     REPLAY_RESAMPLED,
     REPLAY_ESS,
     REPLAY_ARENA,

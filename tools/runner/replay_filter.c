@@ -83,27 +83,33 @@ static void start(model_t *m, uint32_t state, float mean, float sigma)
     m->sigma[state] = sigma;
 }
 
-static void start_position(const replay_study_t *s, model_t *m)
+/* What tells where the filter starts. */
+static replay_sensor_t position_sensor(const replay_study_t *s)
 {
-    if (!s->wanted[REPLAY_GPS] && !s->wanted[REPLAY_FIX]) {
-        const pfl_range_z_t *z = &s->event[replay_first(s, REPLAY_RANGE)].range;
+    return s->wanted[REPLAY_GPS] ? REPLAY_GPS : (s->wanted[REPLAY_FIX] ? REPLAY_FIX : REPLAY_RANGE);
+}
+
+static void start_position(const replay_study_t *s, size_t from, model_t *m)
+{
+    const replay_sensor_t sensor = position_sensor(s);
+    const replay_event_t *e = &s->event[replay_first(s, sensor, from)];
+
+    if (sensor == REPLAY_RANGE) {
+        const pfl_range_z_t *z = &e->range;
         const float square = z->range_m * z->range_m - z->height_m * z->height_m;
         start(m, 0u, z->anchor_x_m, s->sigma[REPLAY_RANGE]);
         start(m, 1u, z->anchor_y_m, s->sigma[REPLAY_RANGE]);
         m->ring_m = pfl_sqrtf(square > 0.0f ? square : 0.0f);
         return;
     }
-    const replay_sensor_t sensor = s->wanted[REPLAY_GPS] ? REPLAY_GPS : REPLAY_FIX;
-    const replay_event_t *e = &s->event[replay_first(s, sensor)];
-
     start(m, 0u, e->z[0], s->sigma[sensor]);
     start(m, 1u, e->z[1], s->sigma[sensor]);
 }
 
 /* Velocity as components in the states first and first + 1. */
-static void start_velocity(const replay_study_t *s, model_t *m, uint32_t first)
+static void start_velocity(const replay_study_t *s, size_t from, model_t *m, uint32_t first)
 {
-    const size_t i = replay_first(s, REPLAY_VELOCITY);
+    const size_t i = replay_first(s, REPLAY_VELOCITY, from);
     const bool measured = i < s->events;
 
     for (uint32_t k = 0u; k < 2u; k++) {
@@ -111,9 +117,9 @@ static void start_velocity(const replay_study_t *s, model_t *m, uint32_t first)
     }
 }
 
-static void start_turn(const replay_study_t *s, model_t *m)
+static void start_turn(const replay_study_t *s, size_t from, model_t *m)
 {
-    const size_t i = replay_first(s, REPLAY_VELOCITY);
+    const size_t i = replay_first(s, REPLAY_VELOCITY, from);
     float speed = 0.0f;
     float heading = 0.0f;
 
@@ -128,10 +134,10 @@ static void start_turn(const replay_study_t *s, model_t *m)
 }
 
 /* The barometer's bias is its first height less that of GPS; without one of them there is none to be known. */
-static void start_height(const replay_study_t *s, model_t *m)
+static void start_height(const replay_study_t *s, size_t from, model_t *m)
 {
-    const size_t gps = replay_first(s, REPLAY_HEIGHT);
-    const size_t baro = replay_first(s, REPLAY_BARO);
+    const size_t gps = replay_first(s, REPLAY_HEIGHT, from);
+    const size_t baro = replay_first(s, REPLAY_BARO, from);
     const bool both = gps < s->events && baro < s->events;
     const size_t height = gps < s->events ? gps : baro;
 
@@ -145,7 +151,8 @@ static void start_height(const replay_study_t *s, model_t *m)
 
 /* ---- Model and sensors ---------------------------------------------------------------------------------------------- */
 
-static void make_model(const replay_study_t *s, model_t *m, pfl_config_t *c)
+/* With the prior of a flight that begins at the event `from`. */
+static void make_model(const replay_study_t *s, size_t from, model_t *m, pfl_config_t *c)
 {
     const float motion = s->motion;
 
@@ -156,8 +163,8 @@ static void make_model(const replay_study_t *s, model_t *m, pfl_config_t *c)
         m->states = 7u;
         m->noises = 4u;
         c->predict = pfl_hover_predict;
-        start_velocity(s, m, 3u);
-        start_height(s, m);
+        start_velocity(s, from, m, 3u);
+        start_height(s, from, m);
         break;
     case REPLAY_TURN:
         m->motion.turn = (pfl_turn_t){.sigma_speed = motion, .sigma_rate = s->turning};
@@ -165,7 +172,7 @@ static void make_model(const replay_study_t *s, model_t *m, pfl_config_t *c)
         m->noises = 2u;
         c->predict = pfl_turn_predict;
         c->circular_mask = 1u << PFL_TURN_HEADING;
-        start_turn(s, m);
+        start_turn(s, from, m);
         break;
     case REPLAY_ODOMETRY:
         m->motion.odometry = (pfl_odometry_t){.speed_scale = 1.0f,
@@ -186,10 +193,10 @@ static void make_model(const replay_study_t *s, model_t *m, pfl_config_t *c)
         m->states = PFL_CV_STATES;
         m->noises = 2u;
         c->predict = pfl_constant_velocity_predict;
-        start_velocity(s, m, PFL_CV_VX);
+        start_velocity(s, from, m, PFL_CV_VX);
         break;
     }
-    start_position(s, m);
+    start_position(s, from, m);
 }
 
 /* Where the numbers of a sensor stand among the states. */
@@ -234,7 +241,7 @@ static void make_setup(const replay_study_t *s, uint32_t run, setup_t *u)
                               .sensors = u->sensor,
                               .draw = draw,
                               .user = &u->model}};
-    make_model(s, &u->model, &u->config);
+    make_model(s, 0u, &u->model, &u->config);
     for (unsigned k = 0u; k < REPLAY_SENSORS; k++) {
         if (s->wanted[k]) {
             u->number[k] = u->sensors;
@@ -305,6 +312,17 @@ static void score_estimate(const replay_study_t *s, const replay_event_t *e, con
     }
 }
 
+/* Behind a gap in the log begins a flight of its own, if it tells a position. */
+static bool restart(const replay_study_t *s, setup_t *u, pfl_t *filter, size_t i, failure_t *failure)
+{
+    if (s->gap_s <= 0.0 || i == 0u || s->event[i].t_s - s->event[i - 1u].t_s < s->gap_s ||
+        replay_first(s, position_sensor(s), i) == s->events) {
+        return true;
+    }
+    make_model(s, i, &u->model, &u->config);
+    return check(pfl_reset(filter, s->event[i].t_us), "pfl_reset", i, failure);
+}
+
 static bool cycle(const replay_study_t *s, const setup_t *u, pfl_t *filter, size_t i, run_output_t *out, sums_t *sums,
                   failure_t *failure)
 {
@@ -339,18 +357,19 @@ static bool cycle(const replay_study_t *s, const setup_t *u, pfl_t *filter, size
     out->cycles_ns[i] = (uint32_t)((double)health.cycles_last * 1e9 / (double)pfl_port_cycles_hz());
     out->cycle[i] = cycle_of(&health);
     out->value[REPLAY_REJECTED] = (double)health.rejected;
+    out->value[REPLAY_RESTARTS] = (double)health.resets;
     if (out->series != NULL) {
         memcpy(&out->series[i * REPLAY_COLUMNS], row, sizeof row);
     }
     return true;
 }
 
-static bool fly(const replay_study_t *s, const setup_t *u, pfl_t *filter, run_output_t *out, failure_t *failure)
+static bool fly(const replay_study_t *s, setup_t *u, pfl_t *filter, run_output_t *out, failure_t *failure)
 {
     sums_t sums = {0};
 
     for (size_t i = 0u; i < s->events; i++) {
-        if (!cycle(s, u, filter, i, out, &sums, failure)) {
+        if (!restart(s, u, filter, i, failure) || !cycle(s, u, filter, i, out, &sums, failure)) {
             return false;
         }
     }

@@ -34,6 +34,7 @@ void replay_judge(const plan_t *plan, table_t runs, verdict_t *verdict)
         verdict_add(verdict, "nees", stats_mean(runs, REPLAY_NEES));
     }
     verdict_add(verdict, "rejected", stats_mean(runs, REPLAY_REJECTED));
+    verdict_add(verdict, "restarts", stats_mean(runs, REPLAY_RESTARTS));
     verdict_add(verdict, "resampled_share", stats_mean(runs, REPLAY_RESAMPLED));
     verdict_add(verdict, "ess_share", stats_mean(runs, REPLAY_ESS));
     verdict_add(verdict, "arena_bytes", (figure_t){stats_mean(runs, REPLAY_ARENA).mean, MISSING});

@@ -54,9 +54,9 @@ bool replay_is_position(replay_sensor_t sensor)
     return sensor == REPLAY_GPS || sensor == REPLAY_FIX;
 }
 
-size_t replay_first(const replay_study_t *s, replay_sensor_t sensor)
+size_t replay_first(const replay_study_t *s, replay_sensor_t sensor, size_t from)
 {
-    size_t i = 0u;
+    size_t i = from;
 
     while (i < s->events && s->event[i].sensor != sensor) {
         i++;

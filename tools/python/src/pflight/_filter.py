@@ -204,9 +204,9 @@ class Filter:
         motion = self._keep(ffi.new("pflight_motion_t *"))
         motion.predict = self.model.function
         motion.user = self.model.structure.c if self.model.structure else handle
+        self._motion, self._handle = motion, handle
         if self.draw is not None:
-            motion.draw = self.draw.function
-            motion.draw_user = self.draw.structure if self.draw.structure is not None else handle
+            self._set_draw()
             c.draw = ffi.addressof(lib, "pflight_motion_draw")
         c.predict, c.user = ffi.addressof(lib, "pflight_motion_predict"), motion
         table = self._keep(ffi.new("pfl_sensor_t[]", max(1, len(self.sensors))))
@@ -215,6 +215,11 @@ class Filter:
             table[k].user = (sensor.structure.c if sensor.structure
                              else self._keep(ffi.new_handle(self._keep(_Seen(self._calls, sensor)))))
         c.sensors = table if self.sensors else ffi.NULL
+
+    def _set_draw(self) -> None:
+        assert self.draw is not None
+        self._motion.draw = self.draw.function
+        self._motion.draw_user = self.draw.structure if self.draw.structure is not None else self._handle
 
     def _done(self, call: str, code: int) -> Status:
         error, self._calls.error = self._calls.error, None
@@ -310,7 +315,11 @@ class Filter:
 
     # ---- Keeping
 
-    def reset(self, t_us: int) -> Status:
+    def reset(self, t_us: int, draw: Draw | None = None) -> Status:
+        """Begins anew from the prior; `draw` is another one, from now on."""
+        if draw is not None:
+            self.draw = self._calls.draw = draw
+            self._set_draw()
         return self._done("pfl_reset", lib.pfl_reset(self._f, t_us))
 
     def resample(self) -> Status:

@@ -95,6 +95,14 @@ def _first(log: Sequence[Event], name: str) -> Event | None:
     return next((event for event in log if event.sensor == name), None)
 
 
+def _begins_anew(log: Sequence[Event], k: int, gap_s: float) -> bool:
+    """Is this event behind a gap, and does what follows tell a position?"""
+    if k == 0 or gap_s <= 0.0 or log[k].t_s - log[k - 1].t_s < gap_s:
+        return False
+    position = next(name for name in ("gps", "fix", "range") if _first(log, name))
+    return _first(log[k:], position) is not None
+
+
 def _f(x: float) -> Any:
     return np.float32(x)
 
@@ -195,6 +203,11 @@ def _take_anchors(log: Sequence[Event], folder: pathlib.Path, over_m: float) -> 
             event.z = [*where[round(event.z[0])], over_m, event.z[1], 1.0]
 
 
+def _sigma_of(choices: dict[str, Any]) -> dict[str, float]:
+    """Of each sensor."""
+    return {name: choices.get(source[2], _SENSOR_SIGMAS[source[2]]) for name, source in _SOURCES.items()}
+
+
 def build(folder: str | pathlib.Path, *, model: str = "cv", sensors: Sequence[str] = ("gps",), particles: int = 500,
           seed: int = 2, motion: float | None = None, turning: float | None = None, ess: float = 0.5, gate: float = 0.0,
           start_speed: float = 10.0, range_dof: float = 3.0, anchors_over: float = 0.0,
@@ -206,8 +219,7 @@ def build(folder: str | pathlib.Path, *, model: str = "cv", sensors: Sequence[st
         raise TypeError(f"unknown {', '.join(sorted(wrong))}; the deviations are: {', '.join(_SENSOR_SIGMAS)}")
     if model not in _MOTION:
         raise ValueError(f"no model '{model}'; the models are: {', '.join(_MOTION)}")
-    every = {**_SENSOR_SIGMAS, **sigmas}
-    sigma = {name: every[source[2]] for name, source in _SOURCES.items()}
+    sigma = _sigma_of(sigmas)
     log = events(folder, sensors, swapped=model == "odometry")
     if model == "odometry":
         _take_odometry(log, pathlib.Path(folder))
@@ -228,21 +240,23 @@ def _surprise(cov: Array, sigma: float, e: npt.NDArray[np.float64]) -> tuple[flo
     return nis, -0.5 * (nis + math.log(float(np.linalg.det(s)))) - math.log(2.0 * math.pi)
 
 
-def fly(folder: str | pathlib.Path, **choices: Any) -> Replay:
-    """Flies the log; the choices are those of `build`."""
+def fly(folder: str | pathlib.Path, *, gap: float = 60.0, **choices: Any) -> Replay:
+    """Flies the log; the choices are those of `build`. gap: behind so many seconds without a measurement it begins anew."""
     f, log = build(folder, **choices)
+    sigma = _sigma_of(choices)
     wanted = [name for name in _SOURCES if name in choices.get("sensors", ("gps",))]
     count = len(log)
     out = Replay(f, np.array([event.t_s for event in log]), [event.sensor for event in log],
                  np.zeros((count, f.states), np.float32), np.zeros((count, f.states, f.states), np.float32),
                  np.full((count, 2), np.nan), np.full(count, np.nan), np.full(count, np.nan), HASH_START)
     for k, event in enumerate(log):
+        if _begins_anew(log, k, gap):
+            f.reset(event.t_us, _prior(choices.get("model", "cv"), log[k:], sigma, choices.get("start_speed", 10.0)))
         f.predict(event.t_us, event.odometry)
         if event.sensor in ("gps", "fix"):
             ahead = f.estimate()
             out.innovation[k] = np.asarray(event.z, np.float32).astype(np.float64) - ahead.mean[:2]
-            sigma = choices.get("sigma_gps", _SENSOR_SIGMAS["sigma_gps"])
-            out.nis[k], out.loglik[k] = _surprise(ahead.cov, sigma, out.innovation[k])
+            out.nis[k], out.loglik[k] = _surprise(ahead.cov, sigma["gps"], out.innovation[k])
         f.update(wanted.index(event.sensor), event.t_us, event.z)
         now = f.estimate()
         out.mean[k], out.cov[k] = now.mean, now.cov
