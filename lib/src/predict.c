@@ -10,13 +10,13 @@ PFL_NOINLINE static bool particle_is_finite(const pfl_t *f, uint32_t i)
 {
     const float *x = &f->x[i];
     uint32_t left = f->config->states;
-    uint32_t broken = 0u;
+    float none = 0.0f;
     do {
-        broken |= pfl_is_finite(*x) ? 0u : 1u;
+        none += *x * 0.0f; /* NaN, of what is not finite, for good */
         x += f->stride;
         left--;
     } while (left > 0u);
-    return broken == 0u;
+    return pfl_is_finite(none);
 }
 
 uint32_t pfl_count_nonfinite(const pfl_t *f, uint32_t first, uint32_t n)

@@ -2,6 +2,7 @@
 #include "pflight/rng.h"
 
 #include "bits.h"
+#include "hash_kernel.h"
 #include "rng_kernels.h"
 
 /* SplitMix64 (Steele, Lea and Flood 2014): spreads any seed over 64 bits. Each step after the addition is invertible and
@@ -47,6 +48,16 @@ void pfl_rng_seed(pfl_rng_t *rng, uint64_t seed)
     }
     for (uint32_t k = 0u; k < 4u; k++) {
         rng->one[k] = s[k];
+    }
+}
+
+void pfl_rng_revive(pfl_rng_t *rng, uint32_t seed)
+{
+    unsigned char *bytes = (unsigned char *)rng;
+    uint32_t word = seed;
+    for (uint32_t at = 0u; at < sizeof *rng; at += 4u) {
+        word = pfl_hash_step(word, at);
+        PFL_COPY(&bytes[at], &word, sizeof word);
     }
 }
 

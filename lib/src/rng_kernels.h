@@ -49,4 +49,8 @@ static inline uint32_t pfl_xoshiro_next_upper(uint32_t s[4])
     assigns \nothing; */
 bool pfl_rng_alive(const pfl_rng_t *rng);
 
+/* Starts all streams anew in the midst of a flight, without the jumps of pfl_rng_seed, which cost more than a batch of
+ * particles: any state but zero will do. */
+void pfl_rng_revive(pfl_rng_t *rng, uint32_t seed);
+
 #endif

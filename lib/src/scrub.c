@@ -80,7 +80,7 @@ bool pfl_revive_random(pfl_t *f)
     if (pfl_rng_alive(&f->rng)) {
         return false;
     }
-    pfl_rng_seed(&f->rng, f->config->seed ^ f->t_us);
+    pfl_rng_revive(&f->rng, (uint32_t)f->t_us);
     f->watched.fault |= PFL_FAULT_RANDOM;
     f->watched.event |= PFL_EVENT_MENDED;
     return true;

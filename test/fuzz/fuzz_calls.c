@@ -649,12 +649,17 @@ static void read_all(const slot_t *s, pfl_status_t want)
     REQUIRE(isfinite(pfl_effective_sample_size(s->f)));
 }
 
-/* One flipped bit of what is guarded is mended at the next call, as if it had not been; two may be beyond repair. */
+/* One flipped bit of what is guarded is mended at the next call, as if it had not been; two may be beyond repair. The
+ * same bit of the block and of its copy is a change that nothing can see: not tried. */
 static void flip_guarded(slot_t *s, size_t offset, uint8_t bit)
 {
     unsigned char *bytes = (unsigned char *)s->arena;
     const bool twice = (take_u8(&world.in) & 7u) == 0u;
     const size_t other = (offset + take_u16(&world.in)) % offsetof(struct pfl, rng);
+    const size_t apart = (offset > other) ? (offset - other) : (other - offset);
+    if (twice && (apart == offsetof(struct pfl, copy)) && ((bit & 7u) == ((bit >> 3) & 7u))) {
+        return;
+    }
     bytes[offset] ^= (unsigned char)(1u << (bit & 7u));
     bytes[other] ^= twice ? (unsigned char)(1u << ((bit >> 3) & 7u)) : 0u;
     if (!twice && (offset < offsetof(struct pfl, seal))) { /* block and copy agree that a damaged seal is wrong */

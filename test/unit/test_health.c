@@ -1,5 +1,6 @@
 /* Health: phases and masks of the watch, guards against damaged memory, reinjection, scrub, and the record of a cycle. */
 #include "core.h"
+#include "rng_kernels.h"
 #include "support.h"
 
 #include "unity.h"
@@ -571,6 +572,22 @@ void test_dead_streams_are_seeded_anew_by_the_next_predict(void)
 }
 
 /* ---- The record --------------------------------------------------------------------------------------------------- */
+
+/* Dead streams come back in the midst of a flight, and not in step with each other. */
+void test_revived_streams_live_and_differ(void)
+{
+    for (uint32_t seed = 0u; seed < 100000u; seed++) {
+        pfl_rng_t rng;
+        memset(&rng, 0, sizeof rng);
+        pfl_rng_revive(&rng, seed * 100003u);
+        TEST_ASSERT_TRUE(pfl_rng_alive(&rng));
+        for (uint32_t lane = 0u; lane < PFL_RNG_LANES; lane++) {
+            const uint32_t next = (lane + 1u) % PFL_RNG_LANES;
+            TEST_ASSERT_TRUE((rng.s[0][lane] != rng.s[0][next]) || (rng.s[1][lane] != rng.s[1][next]));
+            TEST_ASSERT_TRUE((rng.s[0][lane] != rng.one[0]) || (rng.s[1][lane] != rng.one[1]));
+        }
+    }
+}
 
 void test_the_record_tells_the_cycle_in_32_bytes(void)
 {

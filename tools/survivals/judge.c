@@ -13,7 +13,6 @@ typedef struct {
 
 static reference_t references[WORLDS][FLIGHTS];
 static double clean_rmse[WORLDS];
-static uint64_t clean_work[WORLDS];
 
 const char *class_name(class_t c)
 {
@@ -24,11 +23,6 @@ const char *class_name(class_t c)
 double judge_clean_rmse(world_kind_t kind)
 {
     return clean_rmse[kind];
-}
-
-uint64_t judge_clean_work(world_kind_t kind)
-{
-    return clean_work[kind];
 }
 
 double judge_square(const cycle_t *cycle, const instant_t *instant)
@@ -74,9 +68,9 @@ static void trace_cycle(FILE *out, uint32_t k, const cycle_t *c, const instant_t
     for (uint32_t s = 0u; s < STATUSES; s++) {
         fprintf(out, " %d", (int)c->status[s]);
     }
-    fprintf(out, "  fault %03x reject %x mode %02x event %03x mended %u work %u%s%s%s\n", (unsigned)c->health.fault,
+    fprintf(out, "  fault %03x reject %x mode %02x event %03x mended %u%s%s%s\n", (unsigned)c->health.fault,
             (unsigned)c->health.reject, (unsigned)c->health.mode, (unsigned)c->health.event, (unsigned)c->health.mended,
-            (unsigned)c->work, judge_lies(c, instant) ? " OFF" : "", c->nonfinite ? " NONFINITE" : "",
+            judge_lies(c, instant) ? " OFF" : "", c->nonfinite ? " NONFINITE" : "",
             (k == fault.first) ? " <- fault" : "");
 }
 
@@ -99,7 +93,6 @@ static bool fly_clean(world_kind_t kind, uint32_t flight, bool dearest)
         }
         world_step(&world, &r->at[k]);
         plane_cycle(k, &r->at[k], &cycle);
-        clean_work[kind] = (cycle.work > clean_work[kind]) ? cycle.work : clean_work[kind];
         if (!dearest) {
             r->square[k] = judge_square(&cycle, &r->at[k]);
             clean_rmse[kind] += (k >= WARM) ? (r->square[k] / (double)((CYCLES - WARM) * FLIGHTS)) : 0.0;
@@ -181,7 +174,6 @@ judgement_t judge_run(uint64_t run_seed, FILE *trace)
     const uint32_t window = window_of(&fault);
     bool complained = false;
     uint32_t lies = 0u;
-    uint64_t work = 0u;
     if (trace != NULL) {
         fault_print(trace, &fault);
     }
@@ -193,7 +185,6 @@ judgement_t judge_run(uint64_t run_seed, FILE *trace)
         j.lie = j.lie || (lies > LIE_CYCLES);
         j.nonfinite = j.nonfinite || cycle.nonfinite;
         complained = complained || ((k >= window) && plane_complains(&cycle));
-        work = (cycle.work > work) ? cycle.work : work;
         j.usable = cycle.healthy && ((cycle.health.mode & PFL_MODE_USABLE) != 0u);
         if (trace != NULL) {
             trace_cycle(trace, k, &cycle, &r->at[k]);
@@ -202,7 +193,6 @@ judgement_t judge_run(uint64_t run_seed, FILE *trace)
     const double clean = fmax(root_mean(r->square, window), clean_rmse[j.kind]);
     j.ratio = root_mean(square, window) / clean;
     j.late = !(j.ratio <= 1.5);
-    j.work = (double)work / (double)clean_work[j.kind];
     j.fence = !plane_fences_stand();
     j.second = plane.hash_b != r->hash_b;
     j.verdict = verdict_of(&j, r, complained);

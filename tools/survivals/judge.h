@@ -25,14 +25,12 @@ typedef struct {
     bool late;                     /* no more than 1.5 times the clean error within 10 s: G4 */
     bool usable;                   /* in the last cycle */
     double ratio;                  /* of the error after recovery to the clean one */
-    double work;                   /* dearest cycle to the dearest one without a fault: G5 */
 } judgement_t;
 
 /* All flights without a fault. False when a filter cannot be built or a clean flight lies. */
 bool judge_prepare(void);
 
 double judge_clean_rmse(world_kind_t kind);
-uint64_t judge_clean_work(world_kind_t kind);
 
 /* Draws the fault of a run, and says in which world it strikes. */
 world_kind_t judge_draw(uint64_t run_seed);

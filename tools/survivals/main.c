@@ -23,10 +23,10 @@ static bool number_of(const char *text, uint64_t *number)
 
 static void print_run(uint64_t run_seed, const judgement_t *j)
 {
-    printf("%" PRIu64 "|%s|%s|%s|%s|%d%d%d%d%d%d%d|%d|%.4g|%.4f\n", run_seed, fault_region_name(&fault),
+    printf("%" PRIu64 "|%s|%s|%s|%s|%d%d%d%d%d%d%d|%d|%.4g\n", run_seed, fault_region_name(&fault),
            fault_kind_name(&fault), j->kind == WORLD_LAND ? "land" : "gps", class_name(j->verdict),
            j->nonfinite ? 1 : 0, j->fence ? 1 : 0, j->second ? 1 : 0, j->lie ? 1 : 0, j->late ? 1 : 0,
-           j->usable ? 1 : 0, fault_state.struck ? 1 : 0, fault_lasts(&fault) ? 1 : 0, j->ratio, j->work);
+           j->usable ? 1 : 0, fault_state.struck ? 1 : 0, fault_lasts(&fault) ? 1 : 0, j->ratio);
     (void)fflush(stdout);
 }
 
@@ -79,8 +79,7 @@ static int name(uint64_t run_seed)
 static int show_clean(void)
 {
     for (uint32_t kind = 0u; kind < WORLDS; kind++) {
-        printf("%s|%.4f|%" PRIu64 "\n", kind == 0u ? "land" : "gps", judge_clean_rmse((world_kind_t)kind),
-               judge_clean_work((world_kind_t)kind));
+        printf("%s|%.4f\n", kind == 0u ? "land" : "gps", judge_clean_rmse((world_kind_t)kind));
     }
     return 0;
 }

@@ -1,6 +1,8 @@
 /* The application: it flies the filter, heeds what it answers, and looks at every number that comes out. */
 #include "plane.h"
 
+#include "calls.h"
+
 #include "fault.h"
 #include "setup.h"
 
@@ -47,17 +49,6 @@ void pfl_port_fault(int32_t status)
 bool pfl_port_self_test(void)
 {
     return true;
-}
-
-/* ---- Work: blocks of code of the library, counted by the compiler's instrumentation --------------------------------- */
-
-void __sanitizer_cov_trace_pc(void);
-static uint64_t blocks;
-static uint64_t work; /* of the calls that make a cycle: what the application does about an answer is not of it */
-
-void __sanitizer_cov_trace_pc(void)
-{
-    blocks++;
 }
 
 /* ---- Numbers that come out ------------------------------------------------------------------------------------------ */
@@ -208,9 +199,7 @@ static pfl_status_t predict_once(const instant_t *instant)
     if (plane.now_us > (plane.flown_us + GAP_MOST_US)) {
         return PFL_ERR_GAP;
     }
-    const uint64_t before = blocks;
-    const pfl_status_t status = pfl_predict(plane.f, plane.now_us, &instant->input);
-    work += blocks - before;
+    const pfl_status_t status = call_predict(plane.f, plane.now_us, &instant->input);
     plane.flown_us = (status >= PFL_OK) ? plane.now_us : plane.flown_us;
     return status;
 }
@@ -221,32 +210,16 @@ static pfl_status_t predict(const instant_t *instant)
     return heed(status) ? predict_once(instant) : status;
 }
 
-static pfl_status_t update_once(uint16_t sensor, uint64_t t_us, const float *z)
-{
-    const uint64_t before = blocks;
-    const pfl_status_t status = pfl_update(plane.f, sensor, t_us, z);
-    work += blocks - before;
-    return status;
-}
-
 static pfl_status_t update(uint16_t sensor, uint64_t t_us, const float *z)
 {
-    const pfl_status_t status = update_once(sensor, t_us, z);
-    return heed(status) ? update_once(sensor, t_us, z) : status;
-}
-
-static pfl_status_t estimate_once(cycle_t *out)
-{
-    const uint64_t before = blocks;
-    const pfl_status_t status = pfl_estimate(plane.f, out->mean, out->cov);
-    work += blocks - before;
-    return status;
+    const pfl_status_t status = call_update(plane.f, sensor, t_us, z);
+    return heed(status) ? call_update(plane.f, sensor, t_us, z) : status;
 }
 
 static pfl_status_t estimate(cycle_t *out)
 {
-    const pfl_status_t status = estimate_once(out);
-    return heed(status) ? estimate_once(out) : status;
+    const pfl_status_t status = call_estimate(plane.f, out->mean, out->cov);
+    return heed(status) ? call_estimate(plane.f, out->mean, out->cov) : status;
 }
 
 /* ---- One cycle ------------------------------------------------------------------------------------------------------ */
@@ -299,7 +272,6 @@ static void idle(cycle_t *out)
 static void fly(uint32_t number, const instant_t *instant, cycle_t *out)
 {
     fault_between_calls(0u);
-    work = 0u;
     out->status[0] = predict(instant);
     heed_time(out->status[0]);
     for (uint16_t k = 0u; (k < SENSORS) && (plane.f != NULL); k++) {
@@ -311,7 +283,6 @@ static void fly(uint32_t number, const instant_t *instant, cycle_t *out)
         return;
     }
     out->status[1u + SENSORS] = estimate(out);
-    out->work = work;
     fault_between_calls(2u + SENSORS);
     if (plane.f == NULL) {
         return;

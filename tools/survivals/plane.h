@@ -49,7 +49,6 @@ typedef struct {
     pfl_health_t health;
     bool healthy;   /* pfl_health answered */
     bool nonfinite; /* some number out of some call was not finite */
-    uint64_t work;  /* blocks of the library's code that predict, updates and estimate ran */
 } cycle_t;
 
 typedef struct {
