@@ -1,8 +1,8 @@
 """The blocks of code of the Markdown pages, and what runs them. Each block is accounted for by exactly one test: by the one
 that OWNERS names, or by this, which for a page of its own does, from top to bottom:
 
-    c       compiled with the project's warnings, linked and run. A block that begins with #include begins a program, one
-            without goes on with it; a block that begins with a comment of a file's name is that file, compiled alone
+    c       compiled with the project's warnings by gcc and clang, linked and run. A block that begins with #include begins a
+            program, one without goes on with it; one that begins with a comment of a file's name is that file, compiled alone
     sh      run, in a folder that has a flight: flight.ulg, flight.csv, log; tools/ is the repository's
     python  run, behind the blocks of the page before it
     cmake   a CMakeLists.txt for a Cortex-M4F, behind a project `firmware`, configured and its port built
@@ -142,6 +142,7 @@ class Page:
         if len(self.program.splitlines()) >= LINES:
             raise Complaint(f"is a program of {LINES} lines or more")
         own = [] if "pfl_port_cycles(void)" in self.program else [ROOT / "build/run/libpflight_port_posix.a"]
+        must(["clang", *WARNINGS, "-fsyntax-only", source], self.folder)
         must(["gcc", "-O2", *WARNINGS, source, ROOT / "build/run/libpflight.a", *own, "-o", program], self.folder)
         self.program = ""
         return must([program], self.folder)

@@ -112,28 +112,55 @@ def port():
     print(f"guide: the port of the guide has {lines} lines: {done.stdout.strip()}")
 
 
-def wrong_blocks():
-    """Would a wrong block be seen?"""
-    for number, (text, expected) in enumerate(WRONG.items()):
-        complaints = "\n".join(try_page(f"wrong-{number}.md", text)[1])
-        if expected not in complaints:
-            yield f"a wrong block goes unnoticed, '{expected}' was expected:\n{text}{complaints}"
+def links():
+    """What the site's pages link to on this machine is there: the reference too, which Sphinx knows nothing of."""
+    site, count = ROOT / "build/guide", 0
+    for page in [path for path in site.rglob("*.html") if site / "reference" not in path.parents]:
+        for link in re.findall(r'href="([^"#:]+\.html)(?:#[^"]*)?"', page.read_text()):
+            count += 1
+            if not (page.parent / link).is_file():
+                yield f"{page.relative_to(ROOT)}: there is no {link}"
+    if count < 1000:
+        yield f"{count} links only are found in the site"
+
+
+def wrong_link():
+    """Would Sphinx see a wrong link, and a page that the index leaves out?"""
+    folder = OUT / "wrong-link/docs"
+    shutil.rmtree(folder.parent, ignore_errors=True)
+    folder.mkdir(parents=True)
+    (folder / "index.md").write_text("# A\n\n## B\n\n- [C](c.md)\n")
+    (folder / "c.md").write_text("# C\n\n[D](c.md#nowhere)\n")
+    (folder / "e.md").write_text("# E\n")
+    done = subprocess.run([ROOT / "build/guide-venv/bin/sphinx-build", "-q", "-W", "--keep-going", "-c", ROOT / "tools/guides",
+                           folder.parent, folder.parent / "site"], capture_output=True, text=True, check=False)
+    for complaint in ("local id not found", "isn't included in any toctree"):
+        if done.returncode == 0 or complaint not in done.stderr:
+            yield f"Sphinx does not say '{complaint}': {done.stderr}"
+
+
+def wrong_block(number):
+    """Would this one be seen?"""
+    text, expected = list(WRONG.items())[number]
+    complaints = "\n".join(try_page(f"wrong-{number}.md", text)[1])
+    return [] if expected in complaints else [f"a wrong block goes unnoticed, '{expected}' was expected:\n{text}{complaints}"]
 
 
 def main():
     make_a_flight()
     with concurrent.futures.ThreadPoolExecutor(2) as pool:
         tried = list(pool.map(try_page, PAGES))
+        unseen = sum(pool.map(wrong_block, range(len(WRONG))), [])
     bad = [line for _, complaints in tried for line in complaints]
     count = {what: sum(page.count[what] for page, _ in tried) for what in ("run", "looked at", "elsewhere")}
     whole = sum(len(page.blocks) for page, _ in tried)
     if not bad and sum(count.values()) != whole:
         bad.append(f"{whole} blocks, and {count} of them accounted for")
-    bad += [*flags(), *names(), *port(), *wrong_blocks()]
-    print("\n".join(bad))
+    bad += [*unseen, *flags(), *names(), *port(), *links(), *wrong_link()]
+    print("\n".join(bad), end="\n" * bool(bad))
     print(f"{len(PAGES)} pages, {whole} blocks: {count['run']} compiled, run or compared here, {count['elsewhere']} by "
           f"{len({test for _, test in blocks.OWNERS.values()})} other tests, {count['looked at']} lists of commands looked at; "
-          f"{len(WRONG)} wrong blocks seen; {len(bad)} complaints")
+          f"{len(WRONG)} wrong blocks tried; {len(bad)} complaints")
     return 1 if bad else 0
 
 

@@ -18,7 +18,7 @@ myst_heading_anchors = 3
 nitpicky = True
 
 html_theme = "alabaster"
-html_theme_options = {"description": "a particle filter for flight computers", "page_width": "1100px",
+html_theme_options = {"description": "a particle filter for flight computers", "page_width": "1280px",
                       "fixed_sidebar": True}
 html_copy_source = False
 html_show_sourcelink = False
@@ -30,10 +30,10 @@ def contents(text):
     """A hidden toctree under each heading of the index, of the links below it."""
     parts = re.split(r"(?m)^(?=## )", text)
     for k, part in enumerate(parts):
-        pages = re.findall(r"\]\(([\w./-]+)\.md\)", part)
+        pages = re.findall(r"\[([^\]]+)\]\(([\w./-]+)\.md\)", part)
         if k > 0 and pages:
-            caption = part.splitlines()[0][3:]
-            parts[k] += "\n```{toctree}\n:hidden:\n:caption: " + caption + "\n\n" + "\n".join(pages) + "\n```\n\n"
+            entries = "\n".join(f"{title} <{name}>" for title, name in pages)
+            parts[k] += f"\n```{{toctree}}\n:hidden:\n:caption: {part.splitlines()[0][3:]}\n\n{entries}\n```\n\n"
     return "".join(parts)
 
 
