@@ -1,5 +1,6 @@
 /* Flies a filter with a budget on an emulated STM32F405 behind the port of docs/guide/porting.md: does its counter count,
- * and is the budget kept? The exit status is the number of the step that failed. Run by test/guide/check.py. */
+ * and is the budget kept? QEMU's timer counts whether it is switched on or not, so that this line of the port is compiled
+ * only. The exit status is the number of the step that failed. Run by test/guide/check.py. */
 #include "../../port/qemu/semihosting.h"
 #include "pflight/pflight.h"
 
