@@ -18,7 +18,7 @@ myst_heading_anchors = 3
 nitpicky = True
 
 html_theme = "alabaster"
-html_theme_options = {"description": "a particle filter for flight computers", "page_width": "1280px",
+html_theme_options = {"description": "a particle filter for flight computers", "page_width": "1280px", "body_max_width": "auto",
                       "fixed_sidebar": True}
 html_copy_source = False
 html_show_sourcelink = False
