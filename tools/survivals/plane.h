@@ -1,6 +1,6 @@
 /* The aircraft: a filter, a second one behind it in memory that nothing may reach, and an application round both that
- * does what docs/health.md says. All that a run can change is one block of memory, so that a run begins by copying an
- * image of it. */
+ * does what docs/guide/flags.md says. All that a run can change is one block of memory, so that a run begins by copying
+ * an image of it. */
 #ifndef SURVIVAL_PLANE_H
 #define SURVIVAL_PLANE_H
 
