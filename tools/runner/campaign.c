@@ -93,17 +93,19 @@ static bool write_series(const campaign_run_t *run, const outcome_t *outcome, tr
     char *csv = folder != NULL ? path_of(folder, run->study_id, ".csv") : NULL;
     char *trace = folder != NULL ? path_of(folder, run->study_id, ".trace.csv") : NULL;
     char *cloud = folder != NULL ? path_of(folder, run->study_id, ".cloud.csv") : NULL;
-    bool written = csv != NULL && trace != NULL && cloud != NULL;
+    char *look = folder != NULL ? path_of(folder, run->study_id, ".look.jsonl") : NULL;
+    bool written = csv != NULL && trace != NULL && cloud != NULL && look != NULL;
 
     if (!written) {
         (void)fail(failure, EXIT_HARNESS, "out of memory");
     }
     written = written && execute_write(render_csv, outcome, csv, failure) &&
-              execute_trace(outcome->study, 0u, trace, cloud, traced, failure);
+              execute_trace(outcome->study, 0u, trace, cloud, look, traced, failure);
     free(folder);
     free(csv);
     free(trace);
     free(cloud);
+    free(look);
     return written;
 }
 
@@ -116,7 +118,7 @@ static bool use_study(void *user, const outcome_t *outcome, failure_t *failure)
         return false;
     }
     text_add(&run->studies, run->studies.length > 0u ? ",\n" : "");
-    json_summary_study(outcome, run->study_id, traced.cloud, &run->studies);
+    json_summary_study(outcome, run->study_id, &traced, &run->studies);
     junit_add_study(&run->suite, outcome, run->study_id);
     run->accepted = run->accepted && outcome_is_accepted(outcome);
     return true;

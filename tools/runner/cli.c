@@ -28,6 +28,7 @@ typedef enum {
     OPTION_TRACE,
     OPTION_TRACE_RUN,
     OPTION_CLOUD,
+    OPTION_LOOKS,
     OPTION_OUT
 } option_id_t;
 
@@ -54,8 +55,10 @@ static const option_t options[] = {
     [OPTION_BUDGET] = {"--budget-us", "B", "time budget of a filter cycle in microseconds; its p50 must keep it",
                        FOR_ONE},
     [OPTION_TRACE] = {"--trace", "FILE|-", "instead of all else: replay one run, step by step, as CSV", FOR_ONE},
-    [OPTION_TRACE_RUN] = {"--trace-run", "R", "with --trace: the number of the run (default 0)", FOR_TRACE},
+    [OPTION_TRACE_RUN] = {"--trace-run", "R", "with --trace or --looks: the number of the run (default 0)", FOR_TRACE},
     [OPTION_CLOUD] = {"--cloud", "FILE", "with --trace: its particles at some times, as CSV", FOR_TRACE},
+    [OPTION_LOOKS] = {"--looks", "FILE|-", "instead of all else: what --live shows of one run, as lines of JSON",
+                      FOR_ONE},
     [OPTION_OUT] = {"--out", "DIR", "folder for summary, report and time series of all scenarios (default out)",
                     FOR_ALL},
 };
@@ -228,6 +231,8 @@ static bool apply_option(cli_t *cli, option_id_t id, const char *text, failure_t
         return parse_count(name, text, 0u, RUNS_MAX - 1u, &cli->trace_run, failure);
     case OPTION_CLOUD:
         return parse_path(id, text, &cli->cloud, failure);
+    case OPTION_LOOKS:
+        return parse_path(id, text, &cli->looks, failure);
     case OPTION_OUT:
         return parse_path(id, text, &cli->out, failure);
     case OPTION_BUDGET:
@@ -326,11 +331,15 @@ static bool check_scopes(const cli_t *cli, const bool *given, failure_t *failure
             return fail(failure, EXIT_USAGE, "%s is for all scenarios: tools/run %s %s; for one use --json and --csv",
                         name, name, options[i].argument);
         }
-        if (scope == FOR_TRACE && cli->trace == NULL) {
+        if (scope == FOR_TRACE && cli->trace == NULL && (i != OPTION_TRACE_RUN || cli->looks == NULL)) {
             return fail(failure, EXIT_USAGE, "%s needs --trace FILE", name);
         }
-        if (cli->trace != NULL && (i == OPTION_JSON || i == OPTION_CSV)) {
-            return fail(failure, EXIT_USAGE, "%s does not go with --trace, which replays a single run", name);
+        if ((cli->trace != NULL || cli->looks != NULL) && (i == OPTION_JSON || i == OPTION_CSV)) {
+            return fail(failure, EXIT_USAGE, "%s does not go with %s, which replays a single run", name,
+                        cli->trace != NULL ? "--trace" : "--looks");
+        }
+        if (cli->trace != NULL && i == OPTION_LOOKS) {
+            return fail(failure, EXIT_USAGE, "--looks does not go with --trace: give one of them");
         }
     }
     return true;
@@ -506,10 +515,13 @@ bool cli_study(const cli_t *cli, const scenario_t *scenario, study_t *study, fai
 
 void cli_help(text_t *text)
 {
-    text_add(text, "usage: tools/run [OPTION...]           all scenarios, with a report in out/\n"
-                   "       tools/run list                  the scenarios, their filters and settings\n"
-                   "       tools/run SCENARIO [OPTION...]  one scenario; --key value sets a setting too\n"
-                   "       tools/run compare A.json B.json two results: deltas, and are they beyond chance?\n\n");
+    text_add(text,
+             "usage: tools/run [OPTION...]           all scenarios, with a report in out/\n"
+             "       tools/run list                  the scenarios, their filters and settings\n"
+             "       tools/run SCENARIO [OPTION...]  one scenario; --key value sets a setting too\n"
+             "       tools/run SCENARIO --live [page|terminal] [--rate R]  one run's particles, moving, R times as\n"
+             "                                       fast as they were; in a browser, or in the terminal\n"
+             "       tools/run compare A.json B.json two results: deltas, and are they beyond chance?\n\n");
     for (unsigned i = 0u; i < OPTIONS; i++) {
         char left[64];
         (void)snprintf(left, sizeof left, "%s %s", options[i].name, options[i].argument);

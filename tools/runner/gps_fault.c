@@ -221,6 +221,20 @@ static void note(const event_t *e, const float *mean, double sigma_m, bool flagg
     memcpy(row, number, sizeof number);
 }
 
+/* From the side: of the height the barometer tells, of the place nothing but the receiver that fails. */
+static void show(const event_t *e, const float *mean, const pfl_t *f, look_t *look)
+{
+    const look_at_t at = {
+        .t_s = e->t_s,
+        .state = {EAST, HEIGHT},
+        .axis = {"east [m]", "height [m]"},
+        .truth = {MISSING, e->barometer_m},
+        .estimate = {(double)mean[EAST], (double)mean[HEIGHT]},
+    };
+
+    look_take(look, f, &at);
+}
+
 static bool cycle(pfl_t *f, const fault_study_t *s, size_t i, watched_t *w, run_output_t *out, failure_t *failure)
 {
     const event_t *e = &s->event[i];
@@ -252,6 +266,7 @@ static bool cycle(pfl_t *f, const fault_study_t *s, size_t i, watched_t *w, run_
     out->hash = hash_floats(out->hash, mean, STATES);
     out->cycles_ns[i] = (uint32_t)((double)health.cycles_last * 1e9 / (double)pfl_port_cycles_hz());
     out->cycle[i] = cycle_of(&health);
+    show(e, mean, f, out->look);
     return true;
 }
 

@@ -161,6 +161,20 @@ typedef struct {
     float probability[STEPS]; /* of turning */
 } estimate_t;
 
+/* Both models, to be looked at. */
+static void show(const track_t *t, uint32_t k, const float *mean, const pfl_t *f, look_t *look)
+{
+    const look_at_t at = {
+        .t_s = PERIOD_S * (double)(k + 1u),
+        .state = {PFL_CV_X, PFL_CV_Y},
+        .axis = {"x [m]", "y [m]"},
+        .truth = {t->x[k], t->y[k]},
+        .estimate = {(double)mean[PFL_CV_X], (double)mean[PFL_CV_Y]},
+    };
+
+    look_take(look, f, &at);
+}
+
 static bool fly(const manoeuvre_study_t *s, uint32_t run, int which, const track_t *t, estimate_t *e, run_output_t *out,
                 failure_t *failure)
 {
@@ -191,6 +205,7 @@ static bool fly(const manoeuvre_study_t *s, uint32_t run, int which, const track
         if (which == TWO && status == PFL_OK && pfl_health(f, &health) == PFL_OK) {
             out->cycles_ns[k] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
             out->cycle[k] = cycle_of(&health);
+            show(t, k, mean, f, out->look);
         }
     }
     free(arena);

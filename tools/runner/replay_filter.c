@@ -305,6 +305,19 @@ static void score_estimate(const replay_study_t *s, const replay_event_t *e, con
     }
 }
 
+static void show(const replay_event_t *e, const float *mean, const pfl_t *filter, look_t *look)
+{
+    const look_at_t at = {
+        .t_s = e->t_s,
+        .state = {0u, 1u},
+        .axis = {"x [m]", "y [m]"},
+        .truth = {e->truth[0], e->truth[1]},
+        .estimate = {(double)mean[0], (double)mean[1]},
+    };
+
+    look_take(look, filter, &at);
+}
+
 static bool cycle(const replay_study_t *s, const setup_t *u, pfl_t *filter, size_t i, run_output_t *out, sums_t *sums,
                   failure_t *failure)
 {
@@ -338,6 +351,7 @@ static bool cycle(const replay_study_t *s, const setup_t *u, pfl_t *filter, size
     out->hash = hash_floats(out->hash, mean, states);
     out->cycles_ns[i] = (uint32_t)((double)health.cycles_last * 1e9 / (double)pfl_port_cycles_hz());
     out->cycle[i] = cycle_of(&health);
+    show(e, mean, filter, out->look);
     out->value[REPLAY_REJECTED] = (double)health.rejected;
     if (out->series != NULL) {
         memcpy(&out->series[i * REPLAY_COLUMNS], row, sizeof row);

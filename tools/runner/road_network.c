@@ -127,6 +127,7 @@ static bool fly(road_filter_t *filter, road_filter_kind_t kind, const standoff_t
         if (kind == ROAD_TWO) {
             out->cycles_ns[k - 1u] = cycles_ns;
             out->cycle[k - 1u] = cycle;
+            road_filter_show(filter, k, track->target[k], &belief, out->look);
         }
         if (out->series != NULL && (kind == ROAD_TWO || kind == ROAD_ANNULUS)) {
             note(&belief, track->target[k], &uav, kind, *lorry, &out->series[(k - 1u) * COLUMNS]);

@@ -242,3 +242,18 @@ bool road_filter_step(road_filter_t *r, unsigned k, const standoff_sight_t *sigh
     *cycle = cycle_of(&health);
     return true;
 }
+
+void road_filter_show(const road_filter_t *r, unsigned k, const double *target, const standoff_belief_t *belief,
+                      look_t *look)
+{
+    const uint16_t first = r->streets ? PFL_ROAD_X : 0u;
+    const look_at_t at = {
+        .t_s = STANDOFF_PERIOD_S * (double)k,
+        .state = {first, (uint16_t)(first + 1u)},
+        .axis = {"x [m]", "y [m]"},
+        .truth = {target[TARGET_X], target[TARGET_Y]},
+        .estimate = {belief->target[TARGET_X], belief->target[TARGET_Y]},
+    };
+
+    look_take(look, r->filter, &at);
+}

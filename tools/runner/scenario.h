@@ -4,6 +4,7 @@
 #define RUNNER_SCENARIO_H
 
 #include "failure.h"
+#include "look.h"
 #include "stats.h"
 #include "text.h"
 
@@ -84,6 +85,7 @@ typedef struct {
     uint64_t hash;       /* over the filter's estimates, from HASH_START on */
     double *trace;       /* plan.steps x plan.trace_columns, row by row; null unless this run is traced */
     text_t *cloud;       /* for cloud_take (cloud.h); null unless this run is traced */
+    look_t *look;        /* for look_take; likewise */
 } run_output_t;
 
 /* A line of the table. What does not exist is MISSING. */

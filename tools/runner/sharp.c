@@ -241,6 +241,20 @@ static pfl_status_t cycle(pfl_t *f, const model_t *m, uint64_t t_us, const float
     return s == PFL_OK ? pfl_estimate(f, mean, NULL) : s;
 }
 
+/* The optimal one, to be looked at. */
+static void show(const track_t *t, uint32_t k, const float *mean, const pfl_t *f, look_t *look)
+{
+    const look_at_t at = {
+        .t_s = PERIOD_S * (double)(k + 1u),
+        .state = {PFL_CV_X, PFL_CV_Y},
+        .axis = {"x [m]", "y [m]"},
+        .truth = {t->truth[k][0], t->truth[k][1]},
+        .estimate = {(double)mean[PFL_CV_X], (double)mean[PFL_CV_Y]},
+    };
+
+    look_take(look, f, &at);
+}
+
 /* One filter over the track: its estimates, and the times of the optimal one. */
 static bool fly(const sharp_study_t *s, uint32_t run, int which, const track_t *t, float (*estimate)[2],
                 run_output_t *out, failure_t *failure)
@@ -264,6 +278,7 @@ static bool fly(const sharp_study_t *s, uint32_t run, int which, const track_t *
         if (which == OPTIMAL && pfl_health(f, &health) == PFL_OK) {
             out->cycles_ns[k] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
             out->cycle[k] = cycle_of(&health);
+            show(t, k, mean, f, out->look);
         }
     }
     free(arena);

@@ -168,6 +168,7 @@ static bool fly(flight_t *f, run_output_t *out, failure_t *failure)
         if (out != NULL) {
             out->cycles_ns[k - 1u] = cycles_ns;
             out->cycle[k - 1u] = cycle;
+            standoff_pf_show(f->pf, k, f->track->target[k], &f->belief, out->look);
             for (int d = 0; d < TARGET_STATES; d++) {
                 const float x = (float)f->belief.target[d];
                 out->hash = hash_floats(out->hash, &x, 1u);

@@ -187,6 +187,19 @@ static uav_cloud_t look_at_cloud(const pfl_view_t *view, const double *truth)
     return cloud;
 }
 
+static void show(const model_t *model, const pfl_t *filter, const uav_track_t *track, unsigned k, const float *mean)
+{
+    const look_at_t at = {
+        .t_s = (double)k,
+        .state = {PFL_AUTOPILOT_X, PFL_AUTOPILOT_Y},
+        .axis = {"x [m]", "y [m]"},
+        .truth = {track->truth[k][PFL_AUTOPILOT_X], track->truth[k][PFL_AUTOPILOT_Y]},
+        .estimate = {(double)mean[PFL_AUTOPILOT_X], (double)mean[PFL_AUTOPILOT_Y]},
+    };
+
+    look_take(model->clouds->look, filter, &at);
+}
+
 static bool look(const model_t *model, pfl_t *filter, const uav_track_t *track, unsigned k, uav_flight_t *flight,
                  failure_t *failure)
 {
@@ -200,6 +213,7 @@ static bool look(const model_t *model, pfl_t *filter, const uav_track_t *track, 
     }
     to_belief(model, mean, cov, &flight->at[k]);
     flight->cloud[k] = look_at_cloud(&view, track->truth[k]);
+    show(model, filter, track, k, mean);
     if (k % CLOUD_EVERY_S == 0u || k % CLOUD_EVERY_S == CLOUD_EVERY_S - 1u) {
         cloud_take(model->clouds->text, model->clouds->filtered, (double)k, filter, PFL_AUTOPILOT_X, PFL_AUTOPILOT_Y);
     }

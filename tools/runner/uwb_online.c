@@ -140,6 +140,7 @@ static bool fly(const uwb_study_t *s, model_t *model, pfl_t *filter, float *esti
         estimate[2u * i + 1u] = mean[1];
         out->cycles_ns[i] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
         out->cycle[i] = cycle_of(&health);
+        uwb_show(range, mean, filter, out->look);
     }
     return true;
 }

@@ -81,6 +81,22 @@ static void note(const wind_filter_t *f, size_t i, run_output_t *out)
     out->hash = hash_floats(out->hash, mean, PFL_WIND_STATES);
 }
 
+/* The wind: the covariance that all particles share is no part of their spread. A recording has no true wind. */
+static void show(const wind_filter_t *f, size_t i, look_t *look)
+{
+    const double variance = (double)f->wind.cov[PFL_WIND_WW];
+    const look_at_t at = {
+        .t_s = f->study->epoch[i].t_s,
+        .state = {PFL_WIND_Y_WIND, PFL_WIND_X_WIND},
+        .axis = {"wind to east [m/s]", "wind to north [m/s]"},
+        .truth = {MISSING, MISSING},
+        .estimate = {(double)f->mean[PFL_WIND_Y_WIND], (double)f->mean[PFL_WIND_X_WIND]},
+        .variance = {variance, variance},
+    };
+
+    look_take(look, f->filter, &at);
+}
+
 typedef struct {
     double squares, scale, settled;
     double next_outage_s, next_ahead_s;
@@ -149,6 +165,7 @@ static bool run_once(const plan_t *plan, uint32_t run, run_output_t *out, failur
             out->cycles_ns[i] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
             out->cycle[i] = cycle_of(&health);
             note(&f, i, out);
+            show(&f, i, out->look);
             done = score_fix(&f, i, &score, &ahead, failure);
         }
     }
