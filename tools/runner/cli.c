@@ -274,7 +274,7 @@ static bool find_option(const char *text, option_id_t *id, failure_t *failure)
         }
         length += (size_t)snprintf(names + length, sizeof names - length, ", %s", options[i].name);
     }
-    return fail(failure, EXIT_USAGE, "unknown option '%s'; the options are: --help%s", text, names);
+    return fail(failure, EXIT_USAGE, "unknown option '%s'; the options are: --help, --live%s", text, names);
 }
 
 /* ---- The whole line ---------------------------------------------------------------------------------------------- */
