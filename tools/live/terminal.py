@@ -55,26 +55,21 @@ def picture(step, view, columns, rows, braille):
 
 
 def status(step, head, known, extent, rate, paused):
-    share = step["ess"] / step["n"]
-    bar = "#" * round(20 * share)
-    said = ", ".join(flags(step, known)) or "no flag"
-    phase = known["phase"][step["phase"]]
-    error = ""
-    if None not in step["truth"]:
-        error = ", off by " + ", ".join(f"{e - t:.3g}" for e, t in zip(step["estimate"], step["truth"]))
-    return [f"{head['scenario']}   t = {step['t']:.2f} s   {'paused' if paused else f'{rate:g} times as fast'}",
-            f"{head['axes'][0]} over {extent[0]:.3g}, {head['axes'][1]} over {extent[1]:.3g}: estimate o "
-            + ", ".join(f"{e:.5g} +- {s:.3g}" for e, s in zip(step["estimate"], step["sigma"])) + error
-            + (" from the truth +" if error else ""),
-            f"effective sample size [{bar:20}] {step['ess']:.0f} of {step['n']}"
-            f"{'   resampled' if step['resampled'] else ''}   {step['us']:.0f} of {head['budget_us']:g} us",
-            f"phase {phase}: {said}" if step["phase"] else said, KEYS]
+    bar = "#" * round(20 * step["ess"] / step["n"])
+    lines = [f"{head['scenario']}   t = {step['t']:.2f} s   {'paused' if paused else f'{rate:g} times as fast'}"]
+    for axis, wide, estimate, sigma, truth in zip(head["axes"], extent, step["estimate"], step["sigma"], step["truth"]):
+        error = "" if truth is None else f", off by {estimate - truth:.3g} from the truth +"
+        lines.append(f"{axis}: estimate o {estimate:.5g} +- {sigma:.3g}{error}; the picture is {wide:.3g} wide")
+    return lines + [
+        f"effective sample size [{bar:20}] {step['ess']:.0f} of {step['n']}{', resampled' if step['resampled'] else ''}",
+        f"cycle {step['us']:.1f} of {head['budget_us']:g} us; phase {known['phase'][step['phase']]}; "
+        f"{', '.join(flags(step, known)) or 'no flag'}", KEYS]
 
 
 def draw(step, head, known, view, rate, paused):
     columns, height = shutil.get_terminal_size()
     braille = (sys.stdout.encoding or "").lower().replace("-", "") == "utf8"
-    lines, extent = picture(step, view, columns, max(height - 6, 1), braille)
+    lines, extent = picture(step, view, columns, max(height - 7, 1), braille)
     lines += [line[:columns] for line in status(step, head, known, extent, rate, paused)]
     sys.stdout.write("\x1b[H" + "\x1b[K\r\n".join(lines) + "\x1b[J")
     sys.stdout.flush()

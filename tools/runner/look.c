@@ -21,23 +21,26 @@ static void add_pair(text_t *text, const char *name, const double *pair)
     text_add(text, "]");
 }
 
-/* The particles' standard deviations about the estimate. */
-static void spread_of(const pfl_view_t *view, const float *log_weights, const look_at_t *at, double *sigma)
+/* The particles' standard deviations about the estimate; returns their correlation. */
+static double spread_of(const pfl_view_t *view, const float *log_weights, const look_at_t *at, double *sigma)
 {
     double all = 0.0;
+    double product = 0.0;
     double square[2] = {0.0, 0.0};
 
     for (uint32_t i = 0u; i < view->n; i++) {
         const double weight = exp((double)log_weights[i]);
+        const double x = (double)PFL_STATE(view, at->state[0])[i] - at->estimate[0];
+        const double y = (double)PFL_STATE(view, at->state[1])[i] - at->estimate[1];
         all += weight;
-        for (unsigned a = 0u; a < 2u; a++) {
-            const double off = (double)PFL_STATE(view, at->state[a])[i] - at->estimate[a];
-            square[a] += weight * off * off;
-        }
+        square[0] += weight * x * x;
+        square[1] += weight * y * y;
+        product += weight * x * y;
     }
     for (unsigned a = 0u; a < 2u; a++) {
         sigma[a] = sqrt(square[a] / all + at->variance[a]);
     }
+    return product / (all * sigma[0] * sigma[1]);
 }
 
 /* Evenly spread over the array: after a resampling, copies of one particle stand anywhere in it. */
@@ -89,7 +92,7 @@ void look_take(look_t *look, const pfl_t *filter, const look_at_t *at)
         return;
     }
     (void)pfl_particles(filter, &view, log_weights);
-    spread_of(&view, log_weights, at, sigma);
+    const double correlation = spread_of(&view, log_weights, at, sigma);
     free(log_weights);
     if (look->taken == 0u) { /* the end of the line that tells what is shown */
         text_add(&look->text, ",\"axes\":[\"%s\",\"%s\"]}", at->axis[0], at->axis[1]);
@@ -99,6 +102,8 @@ void look_take(look_t *look, const pfl_t *filter, const look_at_t *at)
     add_pair(&look->text, "truth", at->truth);
     add_pair(&look->text, "estimate", at->estimate);
     add_pair(&look->text, "sigma", sigma);
+    text_add(&look->text, ",\"correlation\":");
+    add_number(&look->text, correlation);
     add_health(look, &health);
     if (look->taken % look->every == 0u) {
         add_cloud(&look->text, &view, at);
