@@ -41,7 +41,8 @@ class Steps(unittest.TestCase):
         if done.returncode == 3 and "name the folder of the recordings" in done.stderr:
             self.skipTest(f"no recordings of {scenario}")
         self.assertEqual(("", 0), (done.stderr, done.returncode))
-        return [json.loads(line) for line in done.stdout.splitlines()]
+        head, *steps, end = done.stdout.splitlines()
+        return [json.loads(line) for line in (head, *steps[::max(len(steps) // 500, 1)], end)]
 
     def test_each_scenario_has_steps_of_the_run_itself(self):
         for scenario in SCENARIOS:
