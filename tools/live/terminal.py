@@ -58,7 +58,7 @@ def status(step, head, known, extent, rate, paused):
     bar = "#" * round(20 * step["ess"] / step["n"])
     lines = [f"{head['scenario']}   t = {step['t']:.2f} s   {'paused' if paused else f'{rate:g} times as fast'}"]
     for axis, wide, estimate, sigma, truth in zip(head["axes"], extent, step["estimate"], step["sigma"], step["truth"]):
-        error = "" if truth is None else f", off by {estimate - truth:.3g} from the truth +"
+        error = "" if truth is None else f", off by {estimate - truth:.3g} from the {head['against']} +"
         lines.append(f"{axis}: estimate o {estimate:.5g} +- {sigma:.3g}{error}; the picture is {wide:.3g} wide")
     return lines + [
         f"effective sample size [{bar:20}] {step['ess']:.0f} of {step['n']}{', resampled' if step['resampled'] else ''}",

@@ -108,6 +108,7 @@ class Look:
 
     def __init__(self, lines):
         self.axes = lines[0]["axes"]
+        self.against = lines[0]["against"]  # the truth, or what stands in for it
         self.steps = lines[1:]
 
     def __len__(self):

@@ -15,8 +15,8 @@ INSTANTS = 6
 
 
 def shown(results, scenario):
-    """The plainest study that has particles to look at; None: there is none."""
-    return next((study for study in results.of(scenario) if study.has_look), None)
+    """The first study that has particles to look at; None: there is none."""
+    return next((study for study in results.studies if study.scenario == scenario and study.has_look), None)
 
 
 def thin(look):
@@ -32,12 +32,14 @@ def draw_bands(study):
         t = look["t"][few]
         for a, axes in enumerate(rows):
             mean, three = look["estimate"][few, a], 3.0 * look["sigma"][few, a]
-            axes.fill_between(t, mean - three, mean + three, color=style.BAND, linewidth=0, label="3 standard deviations")
+            axes.fill_between(t, mean - three, mean + three, color=style.BAND, linewidth=0, label="3 sigma")
             axes.plot(t, mean, color=style.OURS, linewidth=1.2, label="estimate")
-            axes.plot(t, look["truth"][few, a], color=style.INK, linewidth=0.9, linestyle="--", label="truth")
+            if a in known(look):
+                axes.plot(t, look["truth"][few, a], color=style.INK, linewidth=0.9, linestyle="--", label=look.against)
             axes.set(ylabel=look.axes[a])
         rows[1].set(xlabel="time [s]")
-        style.legend(rows[0], 3)
+        handles = {label: handle for axes in rows for handle, label in zip(*axes.get_legend_handles_labels())}
+        figure.legend(handles.values(), handles.keys(), loc="outside upper left", ncols=3)
         return figure
     return draw
 
@@ -49,24 +51,35 @@ def known(look):
     return [a for a in range(2) if numpy.isfinite(look["truth"][:, a]).any()]
 
 
+def symmetric_ticks(usual, most):
+    """Of an axis that is linear about zero and logarithmic beyond."""
+    from math import ceil, log10
+    from matplotlib.ticker import FixedLocator
+
+    tens = [10.0 ** k for k in range(ceil(log10(2.0 * usual)), ceil(log10(most)) + 1)]
+    return FixedLocator([-ten for ten in tens] + [0.0] + tens)
+
+
 def draw_inside(study):
     def draw(_):
         import numpy
 
         look = study.look
         seen = known(look)
-        figure, rows = style.new_figure(2.2 * len(seen) + 0.4, rows=len(seen), sharex=True, squeeze=False)
+        figure, rows = style.new_figure(2.0 * len(seen) + 0.4, rows=len(seen), sharex=True, squeeze=False)
         few = thin(look)
         t = look["t"][few]
         for axes, a in zip(rows[:, 0], seen):
             error, three = look["estimate"][:, a] - look["truth"][:, a], 3.0 * look["sigma"][:, a]
             share = numpy.mean(abs(error) <= three)
-            axes.fill_between(t, -three[few], three[few], color=style.BAND, linewidth=0, label="3 standard deviations")
+            axes.fill_between(t, -three[few], three[few], color=style.BAND, linewidth=0, label="3 sigma")
             axes.plot(t, error[few], color=style.OURS, linewidth=1.0, label="error")
             axes.set(ylabel=f"error, {look.axes[a]}")
-            # A cloud that is wide at the start would hide all that follows.
-            most = max(numpy.nanquantile(three, 0.97), numpy.nanquantile(abs(error), 0.97)) * 1.2 + 1e-9
-            axes.set_ylim(-most, most)
+            usual = numpy.nanmedian(three)
+            if three.max() > 10.0 * usual:  # a cloud that is wide at the start would hide all that follows
+                axes.set_yscale("symlog", linthresh=2.0 * usual)
+                axes.yaxis.set_major_locator(symmetric_ticks(usual, three.max()))
+                axes.yaxis.set_major_formatter(lambda value, _: f"{value:g}")
             axes.text(0.99, 0.03, f"{100.0 * share:.1f} % inside", transform=axes.transAxes, ha="right")
         rows[-1, 0].set(xlabel="time [s]")
         style.legend(rows[0, 0])
@@ -74,7 +87,7 @@ def draw_inside(study):
     return draw
 
 
-def ticks(look, happened):
+def apart(look, happened):
     """Times at which something happened, no more of them than can be told apart."""
     import numpy
 
@@ -85,15 +98,24 @@ def ticks(look, happened):
     return t[numpy.unique(((t - t[0]) / width).astype(int), return_index=True)[1]]
 
 
+def spans(look, raised):
+    """Begin and length of the times in which something holds, each until the step after its last."""
+    import numpy
+
+    t = look["t"]
+    edges = numpy.flatnonzero(numpy.diff(numpy.concatenate([[0], raised.astype(int), [0]])))
+    ends = numpy.append(t, t[-1] + (t[-1] - t[0]) / len(t))
+    return [(t[begin], ends[end] - t[begin]) for begin, end in zip(edges[0::2], edges[1::2])]
+
+
 def draw_ess(study):
     def draw(_):
         look = study.look
         figure, axes = style.new_figure()
         few = thin(look)
         axes.plot(look["t"][few], look["n"][few], color=style.MUTED, linewidth=0.9, linestyle=":", label="particles")
-        axes.plot(look["t"][few], look["ess"][few], color=style.OURS, linewidth=1.0, label="effective sample size")
-        when = ticks(look, look["resampled"] > 0)
-        axes.plot(when, 0.0 * when, linestyle="none", marker="|", markersize=8, color=style.OTHER, label="resampled")
+        axes.plot(look["t"][few], look["ess"][few], color=style.OURS, linewidth=1.0, label="effective")
+        style.ticks(axes, apart(look, look["resampled"] > 0), 0.0, 0.05 * look["n"].max(), style.OTHER, "resampled")
         axes.set(xlabel="time [s]", ylabel="particles", ylim=(0.0, None))
         style.legend(axes, 3)
         return figure
@@ -115,8 +137,10 @@ def draw_flags(study):
         figure, axes = style.new_figure(1.1 + 0.27 * len(rows))
         for y, (name, raised) in enumerate(rows.items()):
             color = style.OTHER if name.startswith(("fault", "refused", "event")) else style.OURS
-            when = ticks(look, raised)
-            axes.plot(when, numpy.full(len(when), y), linestyle="none", marker="|", markersize=9, color=color)
+            if name == "resampled":
+                style.ticks(axes, apart(look, raised), y - 0.3, y + 0.3, style.MUTED)
+            else:
+                axes.broken_barh(spans(look, raised), (y - 0.3, 0.6), color=color)
         axes.set(xlabel="time [s]", xlim=(look["t"][0], look["t"][-1]), ylim=(len(rows) - 0.4, -0.6))
         axes.set_yticks(range(len(rows)), [name.lower() for name in rows])
         axes.grid(visible=False, axis="y")
@@ -144,7 +168,8 @@ def draw_clouds(study):
             cloud = numpy.array(look.steps[k]["cloud"]).reshape(-1, 2)
             style.dots(axes, cloud[:, 0], cloud[:, 1], style.OTHER, 1.6, 0.5, "particles")
             axes.plot(*look["estimate"][k], "o", color=style.OURS, markersize=4, label="estimate", linestyle="none")
-            axes.plot(*look["truth"][k], "+", color=style.INK, markersize=8, label="truth", linestyle="none")
+            if len(known(look)) == 2:
+                axes.plot(*look["truth"][k], "+", color=style.INK, markersize=8, label=look.against, linestyle="none")
             axes.set_title(f"{look['t'][k]:.4g} s", fontsize=9)
             axes.tick_params(labelsize=7)
             axes.locator_params(nbins=3)
@@ -174,18 +199,17 @@ def draw_cycles(study):
                                         height_ratios=[2.0, 0.4 + 0.26 * len(bars)] if bars else [1.0])
         few, axes = thin(look), rows[0, 0]
         timed = look["us"][few] > 0.0
-        axes.plot(look["t"][few][timed], look["us"][few][timed], color=style.OURS, linewidth=0.9, label="a cycle, this machine")
-        axes.axhline(study.timing["budget_us"], color=style.OTHER, linestyle="--", linewidth=1.2, label="its budget")
+        axes.plot(look["t"][few][timed], look["us"][few][timed], color=style.OURS, linewidth=0.9, label="a cycle here")
+        axes.axhline(study.timing["budget_us"], color=style.OTHER, linestyle="--", linewidth=1.2, label="budget")
         axes.set(xlabel="time [s]", ylabel="time [µs]", yscale="log")
         style.plain_log(axes.yaxis)
         style.legend(axes)
         if bars:
             low, y = rows[1, 0], range(len(bars))
-            low.barh(y, [mean for mean, _ in bars.values()], 0.6, color=style.OURS)
-            low.plot([worst for _, worst in bars.values()], y, "|", color=style.OTHER, markersize=9)
+            low.barh(y, [mean / 1e3 for mean, _ in bars.values()], 0.6, color=style.OURS)
+            low.plot([worst / 1e3 for _, worst in bars.values()], y, "|", color=style.OTHER, markersize=9)
             low.set_yticks(y, bars, fontsize=8)
-            low.set(xlabel="instructions of a cycle (not cycles); mark: the longest", xscale="log")
-            style.plain_log(low.xaxis)
+            low.set(xlabel="1000 instructions (not cycles)", xlim=(0.0, None))
             low.invert_yaxis()
             low.grid(visible=False, axis="y")
         return figure
@@ -210,7 +234,7 @@ def topic(results, scenario):
                draw_clouds(study)),
         Figure(f"{scenario}-cycles", f"{scenario}: cost of a step against its budget",
                f"{once} Above: on the machine that made this page. Below, where tools/budgets.json has the scenario: emulated "
-               "targets, whose counts the tests hold to within 2 %.", draw_cycles(study)),
+               "targets, mean and (mark) longest; the tests hold these counts to within 2 %.", draw_cycles(study)),
     ]
     if not known(study.look):
         figures = [figure for figure in figures if not figure.id.endswith("-inside")]

@@ -229,6 +229,7 @@ static void show(const event_t *e, const float *mean, const pfl_t *f, look_t *lo
         .state = {EAST, HEIGHT},
         .axis = {"east [m]", "height [m]"},
         .truth = {MISSING, e->barometer_m},
+        .instead = "barometer",
         .estimate = {(double)mean[EAST], (double)mean[HEIGHT]},
     };
 

@@ -95,7 +95,8 @@ void look_take(look_t *look, const pfl_t *filter, const look_at_t *at)
     const double correlation = spread_of(&view, log_weights, at, sigma);
     free(log_weights);
     if (look->taken == 0u) { /* the end of the line that tells what is shown */
-        text_add(&look->text, ",\"axes\":[\"%s\",\"%s\"]}", at->axis[0], at->axis[1]);
+        text_add(&look->text, ",\"axes\":[\"%s\",\"%s\"],\"against\":\"%s\"}", at->axis[0], at->axis[1],
+                 at->instead != NULL ? at->instead : "truth");
         look_line(look);
     }
     text_add(&look->text, "{\"t\":%.9g,\"n\":%lu", at->t_s, (unsigned long)view.n);

@@ -27,6 +27,7 @@ typedef struct {
     uint16_t state[2];   /* across and up */
     const char *axis[2]; /* their names and units */
     double truth[2];
+    const char *instead; /* of the truth, its name; null: it is the truth */
     double estimate[2];
     double variance[2]; /* beyond that of the particles, where part of the state is not in them */
 } look_at_t;
