@@ -101,7 +101,6 @@ static void show(const car_epoch_t *epoch, const float *mean, const pfl_t *f, lo
 static bool drive(const car_study_t *s, model_t *model, pfl_t *f, float *estimate, run_output_t *out,
                   failure_t *failure)
 {
-    const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
     const pfl_pseudoranges_t *fused = NULL;
 
     for (size_t i = 0u; i < s->epochs; i++) {
@@ -119,7 +118,7 @@ static bool drive(const car_study_t *s, model_t *model, pfl_t *f, float *estimat
         fused = &epoch->ranges;
         estimate[2u * i] = mean[PFL_WHEELS_X];
         estimate[2u * i + 1u] = mean[PFL_WHEELS_Y];
-        out->cycles_ns[i] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
+        out->cycles_ns[i] = cycle_ns(health.cycles_last);
         out->cycle[i] = cycle_of(&health);
         show(epoch, mean, f, out->look);
     }

@@ -131,7 +131,6 @@ static void show(const gps_particles_t *p, unsigned k, const float *mean, const 
 static bool fly(const gps_particles_t *p, const pfl_config_t *config, pfl_t *filter, gps_estimate_t *estimate,
                 look_t *look, failure_t *failure)
 {
-    const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
     const bool line = p->study->variant == GPS_LINE;
     float mean[PFL_STATES_MAX];
     float cov[PFL_STATES_MAX * PFL_STATES_MAX];
@@ -150,7 +149,7 @@ static bool fly(const gps_particles_t *p, const pfl_config_t *config, pfl_t *fil
             keep_turn(k, mean, estimate);
         }
         if (k > 0u) {
-            estimate->cycles_ns[k - 1u] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
+            estimate->cycles_ns[k - 1u] = cycle_ns(health.cycles_last);
             estimate->cycle[k - 1u] = cycle_of(&health);
         }
         show(p, k, mean, filter, look);

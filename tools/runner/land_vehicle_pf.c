@@ -130,7 +130,6 @@ static void show(const land_track_t *track, unsigned k, const double *x, const p
 static bool fly(const land_study_t *study, pfl_t *filter, const land_track_t *track, land_estimate_t *estimate,
                 look_t *look, failure_t *failure)
 {
-    const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
     pfl_health_t health;
 
     for (unsigned k = 1u; k <= LAND_STEPS; k++) {
@@ -149,7 +148,7 @@ static bool fly(const land_study_t *study, pfl_t *filter, const land_track_t *tr
         for (int d = 0; d < PFL_LAND_STATES; d++) {
             estimate->x[k][d] = (double)mean[d];
         }
-        estimate->cycles_ns[k - 1u] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
+        estimate->cycles_ns[k - 1u] = cycle_ns(health.cycles_last);
         estimate->cycle[k - 1u] = cycle_of(&health);
         show(track, k, estimate->x[k], filter, look);
     }

@@ -349,7 +349,7 @@ static bool cycle(const replay_study_t *s, const setup_t *u, pfl_t *filter, size
     score_estimate(s, e, mean, cov, states, row, sums);
     sums->ess += (double)health.ess;
     out->hash = hash_floats(out->hash, mean, states);
-    out->cycles_ns[i] = (uint32_t)((double)health.cycles_last * 1e9 / (double)pfl_port_cycles_hz());
+    out->cycles_ns[i] = cycle_ns(health.cycles_last);
     out->cycle[i] = cycle_of(&health);
     show(e, mean, filter, out->look);
     out->value[REPLAY_REJECTED] = (double)health.rejected;

@@ -238,7 +238,7 @@ bool road_filter_step(road_filter_t *r, unsigned k, const standoff_sight_t *sigh
     }
     belief->reach_m = (double)reach_m;
     *lorry = r->streets ? (double)mean[REGIME] : 0.0;
-    *cycles_ns = (uint32_t)((double)health.cycles_last * 1e9 / (double)pfl_port_cycles_hz());
+    *cycles_ns = cycle_ns(health.cycles_last);
     *cycle = cycle_of(&health);
     return true;
 }

@@ -364,7 +364,7 @@ bool standoff_pf_step(standoff_pf_t *pf, unsigned k, const standoff_sight_t *sig
         !count_off_road(pf, k, failure)) {
         return false;
     }
-    *cycles_ns = (uint32_t)((double)health.cycles_last * 1e9 / (double)pfl_port_cycles_hz());
+    *cycles_ns = cycle_ns(health.cycles_last);
     *cycle = cycle_of(&health);
     pf->in_sight = sight != NULL;
     pf->steps = k;

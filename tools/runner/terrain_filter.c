@@ -161,7 +161,6 @@ static void show(const terrain_row_t *row, const float *mean, const pfl_t *filte
 static bool fly(const terrain_study_t *s, pfl_t *filter, model_t *model, pfl_adaptive_t *adaptive,
                 terrain_estimate_t *estimate, run_output_t *out, failure_t *failure)
 {
-    const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
     float spread_m = START_SIGMA_M * 1.4142136f;
 
     for (size_t k = 0u; k < s->rows; k++) {
@@ -184,7 +183,7 @@ static bool fly(const terrain_study_t *s, pfl_t *filter, model_t *model, pfl_ada
         }
         show(&s->row[k], mean, filter, out->look);
         if (k > 0u) {
-            out->cycles_ns[k - 1u] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
+            out->cycles_ns[k - 1u] = cycle_ns(health.cycles_last);
             out->cycle[k - 1u] = cycle_of(&health);
         }
     }

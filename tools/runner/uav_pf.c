@@ -315,7 +315,6 @@ static bool look_ahead_where_due(const model_t *model, const pfl_t *filter, void
 static bool cycle(const uav_study_t *s, pfl_t *filter, const uav_track_t *track, unsigned k, uav_flight_t *flight,
                   failure_t *failure)
 {
-    const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
     const uint64_t t_us = (uint64_t)k * UAV_PERIOD_US;
     const pfl_autopilot_input_t wanted = uav_reference(s, k - 1u);
     const pfl_proposal_input_t with_fix = {&wanted, uav_has_fix(s, k) ? track->z[k] : NULL};
@@ -327,7 +326,7 @@ static bool cycle(const uav_study_t *s, pfl_t *filter, const uav_track_t *track,
         !check(pfl_health(filter, &health), "pfl_health", k, failure)) {
         return false;
     }
-    flight->cycles_ns[k - 1u] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
+    flight->cycles_ns[k - 1u] = cycle_ns(health.cycles_last);
     flight->cycle[k - 1u] = cycle_of(&health);
     flight->resampled = health.resampled;
     return true;

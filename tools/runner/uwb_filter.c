@@ -145,7 +145,6 @@ void uwb_show(const uwb_range_t *range, const float *mean, const pfl_t *filter, 
 
 static bool fly(const uwb_study_t *s, pfl_t *filter, float *estimate, run_output_t *out, failure_t *failure)
 {
-    const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
     pfl_health_t health;
 
     for (size_t i = 0u; i < s->ranges; i++) {
@@ -162,7 +161,7 @@ static bool fly(const uwb_study_t *s, pfl_t *filter, float *estimate, run_output
         }
         estimate[2u * i] = mean[0];
         estimate[2u * i + 1u] = mean[1];
-        out->cycles_ns[i] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
+        out->cycles_ns[i] = cycle_ns(health.cycles_last);
         out->cycle[i] = cycle_of(&health);
         uwb_show(range, mean, filter, out->look);
     }

@@ -148,7 +148,6 @@ static void conclude(const score_t *score, const wind_ahead_t *ahead, double *va
 static bool run_once(const plan_t *plan, uint32_t run, run_output_t *out, failure_t *failure)
 {
     const wind_study_t *s = plan->own;
-    const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
     const double first_s = s->epoch[0].t_s + WIND_SETTLING_S;
     score_t score = {.next_outage_s = first_s, .next_ahead_s = first_s};
     wind_ahead_t ahead = {.starts = 0.0};
@@ -162,7 +161,7 @@ static bool run_once(const plan_t *plan, uint32_t run, run_output_t *out, failur
         pfl_health_t health = {0};
         done = wind_filter_cycle(&f, i, failure) && pfl_health(f.filter, &health) == PFL_OK;
         if (done) {
-            out->cycles_ns[i] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
+            out->cycles_ns[i] = cycle_ns(health.cycles_last);
             out->cycle[i] = cycle_of(&health);
             note(&f, i, out);
             show(&f, i, out->look);
