@@ -14,8 +14,8 @@ ARGUMENTS = ["--headless", "--no-sandbox", "--disable-gpu", "--no-first-run", "-
 class Browser:
     """A page, its console, and a keyboard. To be closed, or used by `with`."""
 
-    def __init__(self, url, width=1280, height=900, dark=False):
-        self._profile = tempfile.TemporaryDirectory()
+    def __init__(self, url=None, **look):
+        self._profile = tempfile.TemporaryDirectory(ignore_cleanup_errors=True)
         to_read, self._write = os.pipe()
         self._read, to_write = os.pipe()
         os.set_inheritable(to_read, True)
@@ -33,10 +33,17 @@ class Browser:
         self._session = self.call("Target.attachToTarget", targetId=page["targetId"], flatten=True)["sessionId"]
         for domain in ("Page", "Runtime", "Log"):
             self.call(f"{domain}.enable")
+        if url is not None:
+            self.open(url, **look)
+
+    def open(self, url, width=1280, height=900, dark=False):
+        """A page, on a screen of that size; what the one before complained of is forgotten."""
         self.call("Emulation.setDeviceMetricsOverride", width=width, height=height, deviceScaleFactor=1,
                   mobile=width < 600)
         self.call("Emulation.setEmulatedMedia",
                   features=[{"name": "prefers-color-scheme", "value": "dark" if dark else "light"}])
+        self.call("Page.navigate", url="about:blank")
+        self.console.clear()
         self.call("Page.navigate", url=url)
         self.until("document.readyState === 'complete'")
 
@@ -47,8 +54,13 @@ class Browser:
         self.close()
 
     def close(self):
-        self._process.kill()
-        self._process.wait()
+        self._session = None
+        try:
+            self.call("Browser.close")
+            self._process.wait(20)
+        except (AssertionError, OSError, subprocess.TimeoutExpired):
+            self._process.kill()
+            self._process.wait()
         os.close(self._read)
         os.close(self._write)
         self._profile.cleanup()

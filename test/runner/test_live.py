@@ -140,12 +140,22 @@ class Server(unittest.TestCase):
 class Page(unittest.TestCase):
     picture = "document.getElementById('cloud').toDataURL()"
 
+    @classmethod
+    def setUpClass(cls):
+        cls.page = browser.Browser()
+
+    @classmethod
+    def tearDownClass(cls):
+        cls.page.close()
+
     def settle(self, page):
         """Two frames: what was asked for is drawn."""
         page.value("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
 
     def test_particles_move_and_the_keyboard_rules_them(self):
-        with Served("road-network") as served, browser.Browser(served.url.group()) as page:
+        page = self.page
+        with Served("road-network", "--rate", "20") as served:
+            page.open(served.url.group())
             page.until("shown > 2")
             first = page.value(self.picture)
             page.until("shown > 6")
@@ -162,7 +172,7 @@ class Page(unittest.TestCase):
             page.press("ArrowLeft")
             self.assertEqual(paused, page.value("shown"))
             page.press("+", "+")
-            self.assertEqual(20, page.value("rate"))
+            self.assertEqual(40, page.value("rate"))
             page.press("f", "f")
             self.settle(page)
             self.assertNotEqual(at_pause, page.value(self.picture))
@@ -180,23 +190,23 @@ class Page(unittest.TestCase):
     def test_light_dark_and_phone(self):
         looks = {"light": {}, "dark": {"dark": True}, "phone": {"width": 390, "height": 844}}
         backs = set()
+        page = self.page
         with Served("land-vehicle", "--rate", "100") as served:
             for name, options in looks.items():
-                with browser.Browser(served.url.group(), **options) as page:
-                    page.until("ended && !playing")
-                    page.screenshot(SHOTS / f"{name}.png")
-                    backs.add(page.value("getComputedStyle(document.body).backgroundColor"))
-                    self.assertLessEqual(page.value("document.documentElement.scrollWidth"),
-                                         page.value("document.documentElement.clientWidth"))
-                    self.assertGreater((SHOTS / f"{name}.png").stat().st_size, 10000)
-                    self.assertEqual([], page.console)
+                page.open(served.url.group(), **options)
+                page.until("ended && !playing")
+                page.screenshot(SHOTS / f"{name}.png")
+                backs.add(page.value("getComputedStyle(document.body).backgroundColor"))
+                self.assertLessEqual(page.value("document.documentElement.scrollWidth"),
+                                     page.value("document.documentElement.clientWidth"))
+                self.assertGreater((SHOTS / f"{name}.png").stat().st_size, 10000)
+                self.assertEqual([], page.console)
         self.assertEqual(2, len(backs))
 
     def test_console_is_watched(self):
-        with browser.Browser("data:text/html,<script>console.error('heard'); none()</script>") as page:
-            page.value("1")
-            self.assertIn("heard", "".join(page.console))
-            self.assertIn("none", "".join(page.console))
+        self.page.open("data:text/html,<script>console.error('heard'); none()</script>")
+        self.assertIn("heard", "".join(self.page.console))
+        self.assertIn("none", "".join(self.page.console))
 
 
 class Terminal:
@@ -218,7 +228,8 @@ class Terminal:
         return
 
     def frames(self):
-        return self.text.split("\x1b[H")[1:]
+        """The pictures that are complete."""
+        return re.findall(r"\x1b\[H(.*?)\x1b\[J", self.text, re.S)
 
     def until_frames(self, count):
         for _ in range(200):
