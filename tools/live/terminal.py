@@ -62,7 +62,7 @@ def status(step, head, known, extent, rate, paused):
         lines.append(f"{axis}: estimate o {estimate:.5g} +- {sigma:.3g}{error}; the picture is {wide:.3g} wide")
     return lines + [
         f"effective sample size [{bar:20}] {step['ess']:.0f} of {step['n']}{', resampled' if step['resampled'] else ''}",
-        f"cycle {step['us']:.1f} of {head['budget_us']:g} us; phase {known['phase'][step['phase']]}; "
+        f"cycle {step['us']:.1f} of {head['budget_us']:g} us; phase {known['phase'][step['phase']] if step['phase'] else 'not judged'}; "
         f"{', '.join(flags(step, known)) or 'no flag'}", KEYS]
 
 

@@ -312,34 +312,50 @@ static void set_defaults(cli_t *cli)
     cli->data = data != NULL && data[0] != '\0' ? data : PFLIGHT_SOURCE_DIR "/../shared/data";
 }
 
+/* Options that want one that replays a single run. */
+static bool lacks_replay(const cli_t *cli, option_id_t id)
+{
+    return options[id].scope == FOR_TRACE && cli->trace == NULL && (id == OPTION_CLOUD || cli->looks == NULL);
+}
+
+/* And those that do not go with one. */
+static bool check_replay(const cli_t *cli, option_id_t id, failure_t *failure)
+{
+    const bool of_all_runs = id == OPTION_JSON || id == OPTION_CSV;
+
+    if (cli->trace != NULL && (of_all_runs || id == OPTION_LOOKS)) {
+        return fail(failure, EXIT_USAGE, "%s does not go with --trace, which replays a single run", options[id].name);
+    }
+    return cli->looks == NULL || !of_all_runs ||
+           fail(failure, EXIT_USAGE, "%s does not go with --looks, which replays a single run", options[id].name);
+}
+
+static bool check_scope(const cli_t *cli, option_id_t id, failure_t *failure)
+{
+    char names[LIST_MAX];
+    const char *name = options[id].name;
+    const scope_t scope = options[id].scope;
+
+    if (cli->command == COMMAND_ALL && scope != FOR_ALL) {
+        return fail(failure, EXIT_USAGE, "%s needs a scenario: tools/run SCENARIO %s ...; the scenarios are: %s", name,
+                    name, scenario_names(names));
+    }
+    if (cli->command == COMMAND_ONE && scope == FOR_ALL) {
+        return fail(failure, EXIT_USAGE, "%s is for all scenarios: tools/run %s %s; for one use --json and --csv", name,
+                    name, options[id].argument);
+    }
+    if (lacks_replay(cli, id)) {
+        return fail(failure, EXIT_USAGE, "%s needs --trace FILE", name);
+    }
+    return check_replay(cli, id, failure);
+}
+
 /* Do the options go together? given: by their position, whether an option is there. */
 static bool check_scopes(const cli_t *cli, const bool *given, failure_t *failure)
 {
-    char names[LIST_MAX];
-
     for (unsigned i = 0u; i < OPTIONS; i++) {
-        const char *name = options[i].name;
-        const scope_t scope = options[i].scope;
-        if (!given[i] || scope == FOR_ANY) {
-            continue;
-        }
-        if (cli->command == COMMAND_ALL && scope != FOR_ALL) {
-            return fail(failure, EXIT_USAGE, "%s needs a scenario: tools/run SCENARIO %s ...; the scenarios are: %s",
-                        name, name, scenario_names(names));
-        }
-        if (cli->command == COMMAND_ONE && scope == FOR_ALL) {
-            return fail(failure, EXIT_USAGE, "%s is for all scenarios: tools/run %s %s; for one use --json and --csv",
-                        name, name, options[i].argument);
-        }
-        if (scope == FOR_TRACE && cli->trace == NULL && (i != OPTION_TRACE_RUN || cli->looks == NULL)) {
-            return fail(failure, EXIT_USAGE, "%s needs --trace FILE", name);
-        }
-        if ((cli->trace != NULL || cli->looks != NULL) && (i == OPTION_JSON || i == OPTION_CSV)) {
-            return fail(failure, EXIT_USAGE, "%s does not go with %s, which replays a single run", name,
-                        cli->trace != NULL ? "--trace" : "--looks");
-        }
-        if (cli->trace != NULL && i == OPTION_LOOKS) {
-            return fail(failure, EXIT_USAGE, "--looks does not go with --trace: give one of them");
+        if (given[i] && options[i].scope != FOR_ANY && !check_scope(cli, (option_id_t)i, failure)) {
+            return false;
         }
     }
     return true;
