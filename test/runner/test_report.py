@@ -392,6 +392,8 @@ class Report(unittest.TestCase):
         self.assertEqual(sum(step["resampled"] for step in steps), ticks.count("M"))
         inside = [abs(step["estimate"][0] - step["truth"][0]) <= 3.0 * step["sigma"][0] for step in steps]
         self.assertIn(f"{100.0 * sum(inside) / len(inside):.1f} % inside", figure(f"{LAND}-inside"))
+        clouds = [d.count("M") for d in re.findall(r' d="([^"]*)"', figure(f"{LAND}-clouds"))]
+        self.assertEqual(6, clouds.count(200))
         for word in ("budget", "cortex-m4f, N = 300", "rv32imafc"):
             self.assertIn(word, figure(f"{LAND}-cycles"))
         self.assertIn("no flag was raised", figure(f"{LAND}-flags"))
