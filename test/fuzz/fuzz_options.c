@@ -146,7 +146,12 @@ static void write_json(const study_t *study, const char *id, stream_t *in)
     json_study(&outcome, &text);
     check_json(&text);
     text_free(&text);
-    json_summary_study(&outcome, id, (outcome.hash & 1u) != 0u, &text);
+    const traced_t traced = {.cloud = (outcome.hash & 1u) != 0u, .look = (outcome.hash & 2u) != 0u};
+    json_summary_study(&outcome, id, &traced, &text);
+    check_json(&text);
+    text_free(&text);
+    json_look(study, &plan, 1u, &text); /* the beginning of an object */
+    text_add(&text, "}");
     check_json(&text);
     text_free(&text);
     text_free(&outcome.verdict.notes);

@@ -13,12 +13,14 @@ import tempfile
 import unittest
 import xml.etree.ElementTree
 
+import browser
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 RUN = ROOT / "tools" / "run"
 REPORT = ROOT / "tools" / "report"
 SHOTS = ROOT / "build" / "check-report"
 LAND = "land-vehicle"
-CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+CHROMIUM = browser.CHROMIUM
 SCREENS = {"light": ("1280,4000", 1), "dark": ("1280,4000", 0), "phone": ("390,4000", 1)}
 
 VOID = {"meta", "link", "br", "img"}
@@ -323,6 +325,11 @@ def page_of(path):
     return page
 
 
+# Of every scenario; whose recording has no truth, has no errors either.
+ONE_RUN = ("bands", "inside", "ess", "flags", "clouds", "cycles")
+WITHOUT_TRUTH = ("wind",)
+
+
 class Report(unittest.TestCase):
     # What each scenario's papers show; a scenario that is skipped for want of its recordings has no figures.
     figures = {
@@ -360,6 +367,40 @@ class Report(unittest.TestCase):
         for scenario in {study["scenario"] for study in parse(out / "summary.json")["studies"]}:
             for name in self.figures.get(scenario, []):
                 self.assertTrue(page.figures.get(f"fig-{scenario}-{name}"), f"{scenario}-{name}")
+
+    @unittest.skipUnless(has_matplotlib(), "matplotlib is not installed")
+    def test_each_scenario_has_one_run_step_by_step(self):
+        page = page_of(out / "report.html")
+        for scenario in {study["scenario"] for study in parse(out / "summary.json")["studies"]}:
+            for name in ONE_RUN:
+                there = scenario not in WITHOUT_TRUTH or name != "inside"
+                self.assertEqual(there, page.figures.get(f"fig-{scenario}-{name}", False), f"{scenario}-{name}")
+
+    @unittest.skipUnless(has_matplotlib(), "matplotlib is not installed")
+    def test_figures_say_what_the_run_did(self):
+        """Ticks where the filter resampled, the flags of the fault, the share of errors inside the bands, the budget."""
+        text = (out / "report.html").read_text(encoding="utf-8")
+        studies = parse(out / "summary.json")["studies"]
+
+        def figure(name):
+            return text[text.index(f'<figure id="fig-{name}">'):].split("</figure>")[0]
+
+        study = next(study for study in studies if study["id"] == f"{LAND}-pf")
+        steps = [json.loads(line) for line in (out / study["look"]).read_text().splitlines()][1:]
+        self.assertEqual(study["look"], f"csv/{LAND}-pf.look.jsonl")
+        ticks = max(re.findall(r' d="([^"]*)"', figure(f"{LAND}-ess").split("legend")[0]), key=lambda d: d.count("M"))
+        self.assertEqual(sum(step["resampled"] for step in steps), ticks.count("M"))
+        inside = [abs(step["estimate"][0] - step["truth"][0]) <= 3.0 * step["sigma"][0] for step in steps]
+        self.assertIn(f"{100.0 * sum(inside) / len(inside):.1f} % inside", figure(f"{LAND}-inside"))
+        clouds = [d.count("M") for d in re.findall(r' d="([^"]*)"', figure(f"{LAND}-clouds"))]
+        self.assertEqual(6, clouds.count(200))
+        for word in ("budget", "cortex-m4f, N = 300", "rv32imafc"):
+            self.assertIn(word, figure(f"{LAND}-cycles"))
+        self.assertIn("no flag was raised", figure(f"{LAND}-flags"))
+        self.assertIn("phase lost", figure("road-network-flags"))
+        if any(study["scenario"] == "gps-fault" for study in studies):
+            for word in ("phase degraded", "refused sensor 1", "mode usable"):
+                self.assertIn(word, figure("gps-fault-flags"))
 
     def test_without_matplotlib(self):
         with tempfile.TemporaryDirectory() as place:
@@ -430,6 +471,36 @@ class Browser(unittest.TestCase):
         self.assertGreater(len(titles), 10)
         for title in titles.values():
             self.assertIn(title.replace("&", "&amp;"), done.stdout)
+
+    def test_keyboard(self):
+        with browser.Browser((out / "report.html").as_uri()) as page:
+            focused = "document.activeElement"
+            page.press("Tab")
+            self.assertEqual("Skip to the results", page.value(f"{focused}.textContent"))
+            self.assertGreaterEqual(page.value(f"{focused}.getBoundingClientRect().left"), 0)
+            page.press("Enter", "\r")
+            page.until(f"{focused}.id === 'main'")
+            order = []
+            for _ in range(400):  # to the first fold: all on the way is a link, a table or a fold
+                page.press("Tab")
+                order.append(page.value(f"{focused}.tagName"))
+                if order[-1] == "SUMMARY":
+                    break
+            self.assertEqual("SUMMARY", order[-1])
+            self.assertLessEqual(set(order), {"A", "DIV", "SUMMARY"})
+            folded = page.value(f"{focused}.parentElement.open")
+            page.press("Enter", "\r")
+            self.assertEqual(not folded, page.value(f"{focused}.parentElement.open"))
+            page.value("document.querySelector('nav a').focus()")
+            page.press("Enter", "\r")
+            page.until("document.querySelector(':target') !== null")
+            self.assertEqual("H2", page.value("document.querySelector(':target').tagName"))
+            self.assertEqual([], page.console)
+
+    def test_phone_needs_no_sideways_scrolling(self):
+        with browser.Browser((out / "report.html").as_uri(), width=390, height=844, dark=True) as page:
+            self.assertLessEqual(page.value("document.documentElement.scrollWidth"), 390)
+            page.screenshot(SHOTS / "phone-dark.png")
 
     def test_screenshots(self):
         SHOTS.mkdir(parents=True, exist_ok=True)

@@ -221,7 +221,7 @@ class Usage(unittest.TestCase):
             done = run(*arguments)
             self.assertEqual((0, ""), (done.returncode, done.stderr))
             for option in ("--filter", "--particles", "--runs", "--seed", "--threads", "--set", "--data", "--json",
-                           "--csv", "--budget-us", "--trace", "--trace-run", "--cloud", "--out", "compare"):
+                           "--csv", "--budget-us", "--trace", "--trace-run", "--cloud", "--looks", "--live", "--out", "compare"):
                 self.assertIn(option, done.stdout)
 
 

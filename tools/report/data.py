@@ -1,5 +1,6 @@
 """What tools/run left in its folder: summary.json, and the time series of each study in csv/."""
 import csv
+import functools
 import json
 import pathlib
 
@@ -67,6 +68,19 @@ class Study:
         """Particles of run number 0."""
         return self._table("cloud", ("set",))
 
+    @property
+    def has_look(self):
+        return self._fields.get("look") is not None
+
+    @functools.cached_property
+    def look(self):
+        """Run number 0 as its filter saw it."""
+        try:
+            lines = (self._folder / self._fields["look"]).read_text(encoding="utf-8").splitlines()
+            return Look([json.loads(line) for line in lines])
+        except (OSError, ValueError) as error:
+            raise NotDrawn(f"{self._fields['look']} cannot be read") from error
+
     def metric(self, name):
         if name not in self.metrics:
             raise NotDrawn(f"{self.id} has no metric {name}")
@@ -87,6 +101,24 @@ class Table:
 
     def __contains__(self, column):
         return column in self._columns
+
+
+class Look:
+    """Steps of a run, and their numbers as arrays; what is unknown is not a number."""
+
+    def __init__(self, lines):
+        self.axes = lines[0]["axes"]
+        self.against = lines[0]["against"]  # the truth, or what stands in for it
+        self.steps = lines[1:]
+
+    def __len__(self):
+        return len(self.steps)
+
+    def __getitem__(self, name):
+        import numpy
+
+        kind = float if name in ("t", "truth", "estimate", "sigma", "ess", "us") else int
+        return numpy.array([step[name] for step in self.steps], dtype=kind)
 
 
 class Results:

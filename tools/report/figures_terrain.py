@@ -32,8 +32,7 @@ def draw_track(flight):
         axes.plot(run["truth_x_m"] / 1e3, run["truth_y_m"] / 1e3, color=style.INK, label="truth")
         axes.plot(run["x_m"] / 1e3, run["y_m"] / 1e3, color=style.OURS, linewidth=1.2, alpha=0.85, label="estimate")
         early = cloud["t_s"] <= 100.0
-        axes.plot(cloud["x"][early] / 1e3, cloud["y"][early] / 1e3, ".", color=style.MUTED, markersize=1.0, zorder=0,
-                  label="particles, to 100 s")
+        style.dots(axes, cloud["x"][early] / 1e3, cloud["y"][early] / 1e3, style.MUTED, 0.8, 0.6, "particles, to 100 s")
         axes.set(xlabel="east [km]", ylabel="north [km]")
         style.to_scale(figure, axes)
         style.legend(axes)

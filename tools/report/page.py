@@ -162,7 +162,7 @@ def navigation(scenarios, results):
         entries.append(f'<li><a href="#{escape(name)}">{escape(name)} <small>{accepted} of {judged}</small></a></li>')
     entries += [f'<li><a href="#{escape(entry["scenario"])}">{escape(entry["scenario"])} <small>skipped</small></a></li>'
                 for entry in results.skipped]
-    return f'<nav aria-label="Scenarios"><ul>{"".join(entries)}</ul></nav>'
+    return f'<nav id="scenarios" tabindex="-1" aria-label="Scenarios"><ul>{"".join(entries)}</ul></nav>'
 
 
 def page(results, scenarios):
@@ -171,8 +171,8 @@ def page(results, scenarios):
     verdict = "pass" if results.accepted else "fail"
     elapsed = math.fsum(study.elapsed_s for study in results.studies)
     sections = "".join(
-        f'<section aria-labelledby="{escape(name)}"><h2 id="{escape(name)}">{escape(name)}</h2>'
-        f'<p class="lead">{escape(results.of(name)[0].summary)}</p>{"".join(topics)}</section>'
+        f'<section aria-labelledby="{escape(name)}"><h2 id="{escape(name)}" tabindex="-1">{escape(name)}</h2>'
+        f'<p class="lead">{escape(results.of(name)[0].summary)} <a href="#scenarios">All scenarios</a></p>{"".join(topics)}</section>'
         for name, topics in scenarios.items())
     return f"""<!DOCTYPE html>
 <html lang="en">

@@ -11,6 +11,7 @@ import sys
 import warnings
 
 import data
+import one_run
 import page
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
@@ -27,11 +28,12 @@ class Topic:
         self.title = "More studies"
 
 
-def topics_of(scenario):
+def topics_of(scenario, results, lacks):
+    """Its own, if it has any; and, where there are plots, that of one run, which all have."""
     name = f"figures_{scenario.replace('-', '_')}"
-    if importlib.util.find_spec(name) is None:
-        return ()
-    return importlib.import_module(name).TOPICS
+    own = importlib.import_module(name).TOPICS if importlib.util.find_spec(name) is not None else ()
+    run = one_run.topic(results, scenario) if lacks is None else None
+    return (*own, run) if run is not None else own
 
 
 def prepare_plots():
@@ -67,7 +69,7 @@ def drawn(figure, results, lacks):
 def scenario_sections(scenario, results, lacks):
     left = [study for study in results.studies if study.scenario == scenario]
     sections = []
-    for topic in topics_of(scenario):
+    for topic in topics_of(scenario, results, lacks):
         mine = [study for study in left if topic.owns(study)]
         left = [study for study in left if study not in mine]
         sections.append(page.topic_section(topic, [drawn(figure, results, lacks) for figure in topic.figures], mine))

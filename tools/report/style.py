@@ -87,6 +87,22 @@ def dots(axes, x, y, color, size=1.6, alpha=0.55, label=None):
         axes.add_line(Line2D([], [], color=color, linestyle="none", marker="o", markersize=3.5, label=label))
 
 
+def ticks(axes, x, low, high, color, label=None):
+    """Many short vertical lines as one path."""
+    import numpy
+    from matplotlib.lines import Line2D
+    from matplotlib.patches import PathPatch
+    from matplotlib.path import Path
+
+    if len(x) > 0:
+        vertices = numpy.column_stack([numpy.repeat(x, 2), numpy.tile([low, high], len(x))])
+        path = Path(vertices, numpy.tile([Path.MOVETO, Path.LINETO], len(x)))
+        path.should_simplify = False
+        axes.add_patch(PathPatch(path, facecolor="none", edgecolor=color, linewidth=1.0))
+    if label is not None:
+        axes.add_line(Line2D([], [], color=color, linestyle="none", marker="|", markersize=8, label=label))
+
+
 def outages(axes, spans, label):
     """Shades spans of the x axis."""
     for i, (begin, end) in enumerate(spans):

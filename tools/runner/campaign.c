@@ -89,21 +89,25 @@ static bool write_text(const text_t *text, const cli_t *cli, const char *name, f
 /* The study's files in csv/. */
 static bool write_series(const campaign_run_t *run, const outcome_t *outcome, traced_t *traced, failure_t *failure)
 {
+    enum { SERIES, TRACE, CLOUD, LOOK, FILES };
+    static const char *const suffix[FILES] = {".csv", ".trace.csv", ".cloud.csv", ".look.jsonl"};
     char *folder = path_of(run->cli->out, "csv", "");
-    char *csv = folder != NULL ? path_of(folder, run->study_id, ".csv") : NULL;
-    char *trace = folder != NULL ? path_of(folder, run->study_id, ".trace.csv") : NULL;
-    char *cloud = folder != NULL ? path_of(folder, run->study_id, ".cloud.csv") : NULL;
-    bool written = csv != NULL && trace != NULL && cloud != NULL;
+    char *path[FILES];
+    bool written = folder != NULL;
 
+    for (int k = 0; k < FILES; k++) {
+        path[k] = folder != NULL ? path_of(folder, run->study_id, suffix[k]) : NULL;
+        written = written && path[k] != NULL;
+    }
     if (!written) {
         (void)fail(failure, EXIT_HARNESS, "out of memory");
     }
-    written = written && execute_write(render_csv, outcome, csv, failure) &&
-              execute_trace(outcome->study, 0u, trace, cloud, traced, failure);
+    written = written && execute_write(render_csv, outcome, path[SERIES], failure) &&
+              execute_trace(outcome->study, 0u, path[TRACE], path[CLOUD], path[LOOK], traced, failure);
+    for (int k = 0; k < FILES; k++) {
+        free(path[k]);
+    }
     free(folder);
-    free(csv);
-    free(trace);
-    free(cloud);
     return written;
 }
 
@@ -116,7 +120,7 @@ static bool use_study(void *user, const outcome_t *outcome, failure_t *failure)
         return false;
     }
     text_add(&run->studies, run->studies.length > 0u ? ",\n" : "");
-    json_summary_study(outcome, run->study_id, traced.cloud, &run->studies);
+    json_summary_study(outcome, run->study_id, &traced, &run->studies);
     junit_add_study(&run->suite, outcome, run->study_id);
     run->accepted = run->accepted && outcome_is_accepted(outcome);
     return true;

@@ -51,14 +51,6 @@ static void close_study(plan_t *plan)
     free(s);
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    const double x = *(const double *)a;
-    const double y = *(const double *)b;
-
-    return (x > y) - (x < y);
-}
-
 /* Horizontally, one error an epoch, from the first on. */
 static void score(const car_study_t *s, const float *estimate, double *error, run_output_t *out)
 {
@@ -76,7 +68,7 @@ static void score(const car_study_t *s, const float *estimate, double *error, ru
         }
     }
     out->value[AT_END] = error[s->epochs - 1u];
-    qsort(error, s->epochs, sizeof *error, compare_doubles);
+    stats_sort(error, s->epochs);
     out->value[RMSE] = sqrt(squares / (double)s->epochs);
     out->value[P95] = error[(size_t)(0.95 * (double)(s->epochs - 1u))];
     out->value[MAX] = error[s->epochs - 1u];
@@ -102,29 +94,18 @@ static bool run_once(const plan_t *plan, uint32_t run, run_output_t *out, failur
     return done;
 }
 
-static metric_t *add(verdict_t *verdict, const char *name, table_t runs, size_t column)
-{
-    return verdict_add(verdict, name, runs.n > 1u ? stats_median(runs, column) : stats_mean(runs, column));
-}
-
 static void judge(const plan_t *plan, table_t runs, verdict_t *verdict)
 {
     const car_study_t *s = plan->own;
-    metric_t *rmse = add(verdict, "rmse_m", runs, RMSE);
-    metric_t *p95 = add(verdict, "p95_m", runs, P95);
-    double worst = 0.0;
+    metric_t *rmse = verdict_add_typical(verdict, "rmse_m", runs, RMSE);
+    metric_t *p95 = verdict_add_typical(verdict, "p95_m", runs, P95);
 
-    add(verdict, "max_m", runs, MAX);
-    add(verdict, "end_m", runs, AT_END);
-    for (size_t r = 0u; r < runs.n; r++) {
-        worst = fmax(worst, runs.table[r * runs.width + RMSE]);
-    }
-    verdict_add(verdict, "rmse_worst_m", (figure_t){worst, MISSING});
+    verdict_add_typical(verdict, "max_m", runs, MAX);
+    verdict_add_typical(verdict, "end_m", runs, AT_END);
+    verdict_add(verdict, "rmse_worst_m", stats_largest(runs, RMSE));
     if (s->filter == CAR_MIXTURE && s->particles >= ACCEPTED_PARTICLES) {
-        rmse->lo = 0.0;
-        rmse->hi = 12.0;
-        p95->lo = 0.0;
-        p95->hi = 25.0;
+        metric_accept(rmse, 0.0, 12.0);
+        metric_accept(p95, 0.0, 25.0);
     }
     text_add(&verdict->notes,
              "Medians over the runs; one error an epoch, from the first on. Plain least-squares fixes: "

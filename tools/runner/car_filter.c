@@ -85,10 +85,22 @@ static bool check(pfl_status_t status, const char *call, size_t i, failure_t *fa
     return status >= 0 || fail(failure, EXIT_HARNESS, "epoch %zu: %s: %s", i, call, pfl_status_string(status));
 }
 
+static void show(const car_epoch_t *epoch, const float *mean, const pfl_t *f, look_t *look)
+{
+    const look_at_t at = {
+        .t_s = epoch->t_s,
+        .state = {PFL_WHEELS_X, PFL_WHEELS_Y},
+        .axis = {"east [m]", "north [m]"},
+        .truth = {epoch->truth_x_m, epoch->truth_y_m},
+        .estimate = {(double)mean[PFL_WHEELS_X], (double)mean[PFL_WHEELS_Y]},
+    };
+
+    look_take(look, f, &at);
+}
+
 static bool drive(const car_study_t *s, model_t *model, pfl_t *f, float *estimate, run_output_t *out,
                   failure_t *failure)
 {
-    const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
     const pfl_pseudoranges_t *fused = NULL;
 
     for (size_t i = 0u; i < s->epochs; i++) {
@@ -106,8 +118,9 @@ static bool drive(const car_study_t *s, model_t *model, pfl_t *f, float *estimat
         fused = &epoch->ranges;
         estimate[2u * i] = mean[PFL_WHEELS_X];
         estimate[2u * i + 1u] = mean[PFL_WHEELS_Y];
-        out->cycles_ns[i] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
+        out->cycles_ns[i] = cycle_ns(health.cycles_last);
         out->cycle[i] = cycle_of(&health);
+        show(epoch, mean, f, out->look);
     }
     return true;
 }

@@ -50,14 +50,6 @@ static double reduced(const double *row, double *ux, double *uy)
     return row[RANGE] - distance;
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    const double x = *(const double *)a;
-    const double y = *(const double *)b;
-
-    return (x > y) - (x < y);
-}
-
 /* The median clock of a constellation in the first epoch, seen from the first fix. */
 static double start_clock(const car_study_t *s, const recording_t *file, bool second)
 {
@@ -76,7 +68,7 @@ static double start_clock(const car_study_t *s, const recording_t *file, bool se
             clock[n++] += ux * s->fix_x_m + uy * s->fix_y_m;
         }
     }
-    qsort(clock, n, sizeof *clock, compare_doubles);
+    stats_sort(clock, n);
     return n > 0u ? clock[n / 2u] : 0.0;
 }
 

@@ -28,6 +28,7 @@ typedef enum {
     OPTION_TRACE,
     OPTION_TRACE_RUN,
     OPTION_CLOUD,
+    OPTION_LOOKS,
     OPTION_OUT
 } option_id_t;
 
@@ -54,8 +55,10 @@ static const option_t options[] = {
     [OPTION_BUDGET] = {"--budget-us", "B", "time budget of a filter cycle in microseconds; its p50 must keep it",
                        FOR_ONE},
     [OPTION_TRACE] = {"--trace", "FILE|-", "instead of all else: replay one run, step by step, as CSV", FOR_ONE},
-    [OPTION_TRACE_RUN] = {"--trace-run", "R", "with --trace: the number of the run (default 0)", FOR_TRACE},
+    [OPTION_TRACE_RUN] = {"--trace-run", "R", "with --trace or --looks: the number of the run (default 0)", FOR_TRACE},
     [OPTION_CLOUD] = {"--cloud", "FILE", "with --trace: its particles at some times, as CSV", FOR_TRACE},
+    [OPTION_LOOKS] = {"--looks", "FILE|-", "instead of all else: what --live shows of one run, as lines of JSON",
+                      FOR_ONE},
     [OPTION_OUT] = {"--out", "DIR", "folder for summary, report and time series of all scenarios (default out)",
                     FOR_ALL},
 };
@@ -228,6 +231,8 @@ static bool apply_option(cli_t *cli, option_id_t id, const char *text, failure_t
         return parse_count(name, text, 0u, RUNS_MAX - 1u, &cli->trace_run, failure);
     case OPTION_CLOUD:
         return parse_path(id, text, &cli->cloud, failure);
+    case OPTION_LOOKS:
+        return parse_path(id, text, &cli->looks, failure);
     case OPTION_OUT:
         return parse_path(id, text, &cli->out, failure);
     case OPTION_BUDGET:
@@ -269,7 +274,7 @@ static bool find_option(const char *text, option_id_t *id, failure_t *failure)
         }
         length += (size_t)snprintf(names + length, sizeof names - length, ", %s", options[i].name);
     }
-    return fail(failure, EXIT_USAGE, "unknown option '%s'; the options are: --help%s", text, names);
+    return fail(failure, EXIT_USAGE, "unknown option '%s'; the options are: --help, --live%s", text, names);
 }
 
 /* ---- The whole line ---------------------------------------------------------------------------------------------- */
@@ -307,30 +312,50 @@ static void set_defaults(cli_t *cli)
     cli->data = data != NULL && data[0] != '\0' ? data : PFLIGHT_SOURCE_DIR "/../shared/data";
 }
 
+/* Options that want one that replays a single run. */
+static bool lacks_replay(const cli_t *cli, option_id_t id)
+{
+    return options[id].scope == FOR_TRACE && cli->trace == NULL && (id == OPTION_CLOUD || cli->looks == NULL);
+}
+
+/* And those that do not go with one. */
+static bool check_replay(const cli_t *cli, option_id_t id, failure_t *failure)
+{
+    const bool of_all_runs = id == OPTION_JSON || id == OPTION_CSV;
+
+    if (cli->trace != NULL && (of_all_runs || id == OPTION_LOOKS)) {
+        return fail(failure, EXIT_USAGE, "%s does not go with --trace, which replays a single run", options[id].name);
+    }
+    return cli->looks == NULL || !of_all_runs ||
+           fail(failure, EXIT_USAGE, "%s does not go with --looks, which replays a single run", options[id].name);
+}
+
+static bool check_scope(const cli_t *cli, option_id_t id, failure_t *failure)
+{
+    char names[LIST_MAX];
+    const char *name = options[id].name;
+    const scope_t scope = options[id].scope;
+
+    if (cli->command == COMMAND_ALL && scope != FOR_ALL) {
+        return fail(failure, EXIT_USAGE, "%s needs a scenario: tools/run SCENARIO %s ...; the scenarios are: %s", name,
+                    name, scenario_names(names));
+    }
+    if (cli->command == COMMAND_ONE && scope == FOR_ALL) {
+        return fail(failure, EXIT_USAGE, "%s is for all scenarios: tools/run %s %s; for one use --json and --csv", name,
+                    name, options[id].argument);
+    }
+    if (lacks_replay(cli, id)) {
+        return fail(failure, EXIT_USAGE, "%s needs --trace FILE", name);
+    }
+    return check_replay(cli, id, failure);
+}
+
 /* Do the options go together? given: by their position, whether an option is there. */
 static bool check_scopes(const cli_t *cli, const bool *given, failure_t *failure)
 {
-    char names[LIST_MAX];
-
     for (unsigned i = 0u; i < OPTIONS; i++) {
-        const char *name = options[i].name;
-        const scope_t scope = options[i].scope;
-        if (!given[i] || scope == FOR_ANY) {
-            continue;
-        }
-        if (cli->command == COMMAND_ALL && scope != FOR_ALL) {
-            return fail(failure, EXIT_USAGE, "%s needs a scenario: tools/run SCENARIO %s ...; the scenarios are: %s",
-                        name, name, scenario_names(names));
-        }
-        if (cli->command == COMMAND_ONE && scope == FOR_ALL) {
-            return fail(failure, EXIT_USAGE, "%s is for all scenarios: tools/run %s %s; for one use --json and --csv",
-                        name, name, options[i].argument);
-        }
-        if (scope == FOR_TRACE && cli->trace == NULL) {
-            return fail(failure, EXIT_USAGE, "%s needs --trace FILE", name);
-        }
-        if (cli->trace != NULL && (i == OPTION_JSON || i == OPTION_CSV)) {
-            return fail(failure, EXIT_USAGE, "%s does not go with --trace, which replays a single run", name);
+        if (given[i] && options[i].scope != FOR_ANY && !check_scope(cli, (option_id_t)i, failure)) {
+            return false;
         }
     }
     return true;
@@ -506,10 +531,13 @@ bool cli_study(const cli_t *cli, const scenario_t *scenario, study_t *study, fai
 
 void cli_help(text_t *text)
 {
-    text_add(text, "usage: tools/run [OPTION...]           all scenarios, with a report in out/\n"
-                   "       tools/run list                  the scenarios, their filters and settings\n"
-                   "       tools/run SCENARIO [OPTION...]  one scenario; --key value sets a setting too\n"
-                   "       tools/run compare A.json B.json two results: deltas, and are they beyond chance?\n\n");
+    text_add(text,
+             "usage: tools/run [OPTION...]           all scenarios, with a report in out/\n"
+             "       tools/run list                  the scenarios, their filters and settings\n"
+             "       tools/run SCENARIO [OPTION...]  one scenario; --key value sets a setting too\n"
+             "       tools/run SCENARIO --live [page|terminal] [--rate R]  one run's particles, moving, R times as\n"
+             "                                       fast as they were; in a browser, or in the terminal\n"
+             "       tools/run compare A.json B.json two results: deltas, and are they beyond chance?\n\n");
     for (unsigned i = 0u; i < OPTIONS; i++) {
         char left[64];
         (void)snprintf(left, sizeof left, "%s %s", options[i].name, options[i].argument);

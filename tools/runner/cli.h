@@ -25,7 +25,8 @@ typedef struct {
     const char *out;                             /* folder for the files of all scenarios; never null */
     const char *trace;                           /* replay one run into this file, instead of all else */
     const char *cloud;                           /* and its particles into this one */
-    uint32_t trace_run;                          /* the run */
+    const char *looks;                           /* one run as steps to be looked at, likewise instead of all else */
+    uint32_t trace_run;                          /* the run of either */
     const char *set[CLI_SETS_MAX];               /* "key=value" */
     char spelled[CLI_SETS_MAX][CLI_SPELLED_MAX]; /* room for those that stood as "--key value" */
     size_t sets;

@@ -1,11 +1,14 @@
 /* What a scenario takes out of a filter of the library for tables and plots: see cloud.h. */
 #include "cloud.h"
 
+uint32_t cycle_ns(uint32_t cycles)
+{
+    return (uint32_t)((double)cycles * 1e9 / (double)pfl_port_cycles_hz());
+}
+
 cycle_t cycle_of(const pfl_health_t *health)
 {
-    const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
-
-    return (cycle_t){health->ess, health->resampled, (uint32_t)((double)health->cycles_resample * ns_per_cycle)};
+    return (cycle_t){health->ess, health->resampled, cycle_ns(health->cycles_resample)};
 }
 
 void cloud_take(text_t *cloud, const char *set, double t_s, const pfl_t *filter, uint16_t x_state, uint16_t y_state)

@@ -6,6 +6,9 @@
 
 #include "pflight/pflight.h"
 
+/* Counter cycles as time. */
+uint32_t cycle_ns(uint32_t cycles);
+
 /* What a cycle did, out of the health of the filter after it. */
 cycle_t cycle_of(const pfl_health_t *health);
 

@@ -14,6 +14,8 @@
 #include <sys/stat.h>
 #include <time.h>
 
+#define LOOK_CLOUDS 24u /* of a run in the report, about so many */
+
 /* ---- Results ------------------------------------------------------------------------------------------------------ */
 
 /* Sorts them. */
@@ -143,8 +145,8 @@ bool execute_study(const cli_t *cli, const study_t *study, use_fn use, void *use
     return done;
 }
 
-bool execute_trace(const study_t *study, uint32_t run, const char *trace, const char *cloud, traced_t *traced,
-                   failure_t *failure)
+bool execute_trace(const study_t *study, uint32_t run, const char *trace, const char *cloud, const char *look,
+                   traced_t *traced, failure_t *failure)
 {
     plan_t plan;
     results_t results = {0};
@@ -153,10 +155,13 @@ bool execute_trace(const study_t *study, uint32_t run, const char *trace, const 
     if (!study->scenario->open(study, &plan, failure)) {
         return false;
     }
+    results.look.every = (uint32_t)(plan.cycles / LOOK_CLOUDS + 1u);
+    json_look(study, &plan, run, &results.look.text);
     bool done = monte_carlo_trace(study, &plan, run, &results, failure);
     if (done) {
         render_trace(&plan, &results, &text);
-        *traced = (traced_t){plan.steps, results.cloud.length > 0u, hash_u64(HASH_START, results.hash[0])};
+        *traced = (traced_t){plan.steps, results.cloud.length > 0u, results.look.taken > 0u,
+                             hash_u64(HASH_START, results.hash[0])};
         done = text_write(&text, trace, failure);
     }
     text_free(&text);
@@ -165,17 +170,62 @@ bool execute_trace(const study_t *study, uint32_t run, const char *trace, const 
         text.spoilt = text.spoilt || results.cloud.spoilt;
         done = text_write(&text, cloud, failure);
     }
+    done = done && (look == NULL || !traced->look || text_write(&results.look.text, look, failure));
     text_free(&text);
     results_free(&results);
     study->scenario->close(&plan);
     return done;
 }
 
+/* All steps of one run of a filter, each with its cloud; onto standard output as they come. */
+static bool look_with(const study_t *study, uint32_t run, const char *path, bool *taken, failure_t *failure)
+{
+    const bool standard = strcmp(path, "-") == 0;
+    plan_t plan;
+    results_t results = {.look = {.every = 1u, .stream = standard ? stdout : NULL}};
+    text_t *text = &results.look.text;
+
+    if (!study->scenario->open(study, &plan, failure)) {
+        return false;
+    }
+    json_look(study, &plan, run, text);
+    bool done = monte_carlo_trace(study, &plan, run, &results, failure);
+    *taken = done && results.look.taken > 0u;
+    if (*taken) {
+        text_add(text, "{\"hash\":\"%016llx\"}", (unsigned long long)hash_u64(HASH_START, results.hash[0]));
+        look_line(&results.look);
+        done = standard ? !text->spoilt && ferror(stdout) == 0 : text_write(text, path, failure);
+        done = done || fail(failure, EXIT_HARNESS, "cannot write to standard output");
+    }
+    results_free(&results);
+    study->scenario->close(&plan);
+    return done;
+}
+
+/* The filter asked for, or else the first of the scenario's that has particles. */
+static bool look_at_one(const cli_t *cli, study_t *study, failure_t *failure)
+{
+    const char *filters = cli->filter != NULL ? cli->filter : study->scenario->filters;
+    bool taken = false;
+
+    while (!taken && *filters != '\0') {
+        const size_t length = strcspn(filters, "|");
+        (void)snprintf(study->filter, sizeof study->filter, "%.*s", (int)length, filters);
+        if (!look_with(study, cli->trace_run, cli->looks, &taken, failure) &&
+            (cli->filter != NULL || failure->exit_code != EXIT_USAGE)) {
+            return false; /* a filter that does not go with the settings is not the one to look at */
+        }
+        filters += length + (filters[length] == '|' ? 1u : 0u);
+    }
+    return taken || fail(failure, EXIT_USAGE, "%s: no particles to look at with these settings: give another --filter",
+                         study->scenario->name);
+}
+
 static bool trace_one(const cli_t *cli, const study_t *study, failure_t *failure)
 {
     traced_t traced;
 
-    if (!execute_trace(study, cli->trace_run, cli->trace, cli->cloud, &traced, failure)) {
+    if (!execute_trace(study, cli->trace_run, cli->trace, cli->cloud, NULL, &traced, failure)) {
         return false;
     }
     if (cli->cloud != NULL && !traced.cloud) {
@@ -211,6 +261,9 @@ bool execute_one(const cli_t *cli, bool *accepted, failure_t *failure)
     *accepted = true;
     if (!cli_study(cli, cli->scenario, &study, failure)) {
         return false;
+    }
+    if (cli->looks != NULL) {
+        return look_at_one(cli, &study, failure);
     }
     return cli->trace != NULL ? trace_one(cli, &study, failure) : execute_study(cli, &study, use_one, &one, failure);
 }

@@ -16,12 +16,14 @@ bool execute_study(const cli_t *cli, const study_t *study, use_fn use, void *use
 typedef struct {
     size_t steps;
     bool cloud;    /* the scenario has particles to show */
+    bool look;     /* and steps to be looked at */
     uint64_t hash; /* what the study's hash would be if this were its only run */
 } traced_t;
 
-/* Replays one run into a file, and its particles, if there are any, into another one. cloud: null: not wanted. */
-bool execute_trace(const study_t *study, uint32_t run, const char *trace, const char *cloud, traced_t *traced,
-                   failure_t *failure);
+/* Replays one run into a file, and its particles and steps to be looked at, if there are any, into others. cloud, look:
+ * null: not wanted. */
+bool execute_trace(const study_t *study, uint32_t run, const char *trace, const char *cloud, const char *look,
+                   traced_t *traced, failure_t *failure);
 
 /* Writes what a render function makes of an outcome. */
 typedef void (*render_fn)(const outcome_t *outcome, text_t *text);

@@ -202,7 +202,7 @@ typedef struct {
     gps_estimate_t partner;
     gps_estimate_t raw;
     bool has_partner;
-    text_t *cloud;
+    look_t *look;
 } workspace_t;
 
 static double square_error(int axes, const double *a, const double *b)
@@ -243,7 +243,7 @@ static bool filter_track(const gps_study_t *s, uint32_t run, workspace_t *w, fai
         return gps_turn_kalman(s, &w->track, &w->own, failure);
     case GPS_PF:
     case GPS_PF_COLOURED:
-        return gps_particle_filter(s, s->filter == GPS_PF_COLOURED, run, &w->track, &w->own, w->cloud, failure);
+        return gps_particle_filter(s, s->filter == GPS_PF_COLOURED, run, &w->track, &w->own, w->look, failure);
     case GPS_RAW:
         w->own = w->raw;
         return true;
@@ -331,7 +331,7 @@ static void fill_trace(const gps_study_t *s, const workspace_t *w, double *trace
 
 static bool work(const gps_study_t *s, uint32_t run, workspace_t *w, run_output_t *out, failure_t *failure)
 {
-    w->cloud = out->cloud;
+    w->look = out->look;
     gps_make_track(s, run, &w->track);
     memcpy(w->raw.position, w->track.gps, sizeof w->track.gps);
     memcpy(w->raw.velocity, w->track.gps_velocity, sizeof w->track.gps_velocity);

@@ -147,9 +147,9 @@ bool gps_turn_kalman(const gps_study_t *study, const gps_track_t *track, gps_est
 #define GPS_TURN_REDRAW_HZ 0.1
 #define GPS_TURN_REDRAW_SIGMA 0.3
 
-/* cloud: for cloud_take, or null. */
+/* look: for look_take, or null. */
 bool gps_particle_filter(const gps_study_t *study, bool coloured, uint32_t run, const gps_track_t *track,
-                         gps_estimate_t *estimate, text_t *cloud, failure_t *failure);
+                         gps_estimate_t *estimate, look_t *look, failure_t *failure);
 
 /* What differs between the straight line and the path with turns: states, model and sensors. Sensor 0 takes the first
  * measurement or all of them, sensor 1 the later ones of the coloured filter, sensor 2 the velocity. */

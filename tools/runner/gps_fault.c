@@ -221,6 +221,21 @@ static void note(const event_t *e, const float *mean, double sigma_m, bool flagg
     memcpy(row, number, sizeof number);
 }
 
+/* From the side: of the height the barometer tells, of the place nothing but the receiver that fails. */
+static void show(const event_t *e, const float *mean, const pfl_t *f, look_t *look)
+{
+    const look_at_t at = {
+        .t_s = e->t_s,
+        .state = {EAST, HEIGHT},
+        .axis = {"east [m]", "height [m]"},
+        .truth = {MISSING, e->barometer_m},
+        .instead = "barometer",
+        .estimate = {(double)mean[EAST], (double)mean[HEIGHT]},
+    };
+
+    look_take(look, f, &at);
+}
+
 static bool cycle(pfl_t *f, const fault_study_t *s, size_t i, watched_t *w, run_output_t *out, failure_t *failure)
 {
     const event_t *e = &s->event[i];
@@ -250,8 +265,9 @@ static bool cycle(pfl_t *f, const fault_study_t *s, size_t i, watched_t *w, run_
         note(e, mean, sigma_m, w->flagged, &out->series[i * COLUMNS]);
     }
     out->hash = hash_floats(out->hash, mean, STATES);
-    out->cycles_ns[i] = (uint32_t)((double)health.cycles_last * 1e9 / (double)pfl_port_cycles_hz());
+    out->cycles_ns[i] = cycle_ns(health.cycles_last);
     out->cycle[i] = cycle_of(&health);
+    show(e, mean, f, out->look);
     return true;
 }
 
@@ -350,46 +366,31 @@ static void close_study(plan_t *plan)
     free(s);
 }
 
-static metric_t *add(verdict_t *verdict, const char *name, table_t runs, size_t column)
-{
-    return verdict_add(verdict, name, runs.n > 1u ? stats_median(runs, column) : stats_mean(runs, column));
-}
-
 /* The worst run, where a promise says always. */
 static metric_t *add_worst(verdict_t *verdict, const char *name, table_t runs, size_t column)
 {
-    double worst = runs.table[column];
-
-    for (size_t r = 1u; r < runs.n; r++) {
-        worst = fmax(worst, runs.table[r * runs.width + column]);
-    }
-    return verdict_add(verdict, name, (figure_t){worst, MISSING});
+    return verdict_add(verdict, name, stats_largest(runs, column));
 }
 
 static void judge(const plan_t *plan, table_t runs, verdict_t *verdict)
 {
     const fault_study_t *s = plan->own;
-    metric_t *height = add(verdict, "height_max_m", runs, HEIGHT_MAX);
+    metric_t *height = verdict_add_typical(verdict, "height_max_m", runs, HEIGHT_MAX);
 
     metric_t *worst = add_worst(verdict, "height_max_worst_m", runs, HEIGHT_MAX);
 
-    add(verdict, "height_rms_m", runs, HEIGHT_RMS);
+    verdict_add_typical(verdict, "height_rms_m", runs, HEIGHT_RMS);
     metric_t *delay = add_worst(verdict, "flag_delay_s", runs, FLAG_DELAY);
     metric_t *jump = add_worst(verdict, "jump_flag_delay_s", runs, JUMP_DELAY);
     metric_t *alarms = add_worst(verdict, "false_flags", runs, FALSE_FLAGS);
-    add(verdict, "flagged_share", runs, FLAGGED_SHARE);
-    add(verdict, "position_sigma_max_m", runs, SPREAD_MAX);
+    verdict_add_typical(verdict, "flagged_share", runs, FLAGGED_SHARE);
+    verdict_add_typical(verdict, "position_sigma_max_m", runs, SPREAD_MAX);
     if (s->gates && s->particles >= 500u) {
-        height->lo = 0.0;
-        height->hi = 1.4;
-        worst->lo = 0.0;
-        worst->hi = 1.4;
-        delay->lo = GOOD_UNTIL_S - s->onset_s; /* earlier it is a false flag */
-        delay->hi = 1.0;
-        jump->lo = 0.0;
-        jump->hi = 1.0;
-        alarms->lo = 0.0;
-        alarms->hi = 0.0;
+        metric_accept(height, 0.0, 1.4);
+        metric_accept(worst, 0.0, 1.4);
+        metric_accept(delay, GOOD_UNTIL_S - s->onset_s, 1.0); /* earlier it is a false flag */
+        metric_accept(jump, 0.0, 1.0);
+        metric_accept(alarms, 0.0, 0.0);
     }
     text_add(&verdict->notes,
              "Worst of all runs where a promise says always. GPS height is five standard deviations off the barometer "

@@ -7,12 +7,6 @@
 #define RUNS_FOR_ACCEPTANCE 100u
 #define RUNS_FOR_RATIO_RAW 400u /* 0.43 is three standard errors above the mean then, and one and a half at 100 */
 
-static void accept(metric_t *metric, double lo, double hi)
-{
-    metric->lo = lo;
-    metric->hi = hi;
-}
-
 /* ---- Figures ------------------------------------------------------------------------------------------------------ */
 
 /* Root of the mean of squares. */
@@ -49,7 +43,7 @@ static void add_exact(verdict_t *verdict, const char *name, double value, gps_re
 
     if (!isnan(reference.value)) {
         const double slack = 1.1 * reference.rounding; /* a figure that was rounded twice may be just beyond */
-        accept(metric, reference.value - slack, reference.value + slack);
+        metric_accept(metric, reference.value - slack, reference.value + slack);
     }
 }
 
@@ -66,7 +60,7 @@ static void judge_expected(const gps_study_t *s, verdict_t *verdict)
         add_exact(verdict, "nees_expected", expected.nees, gps_reference_nees(s));
     }
     if (s->filter == GPS_KF && gps_is_standard(s) && !s->longrun && gps_document_deviation(&deviation)) {
-        accept(verdict_add(verdict, "gain_deviation", (figure_t){deviation, MISSING}), 0.0, 1e-7);
+        metric_accept(verdict_add(verdict, "gain_deviation", (figure_t){deviation, MISSING}), 0.0, 1e-7);
         text_add(&verdict->notes,
                  "gain_deviation: the largest of gain and covariance from the page's, k = 1 .. 100.\n");
     }
@@ -84,14 +78,14 @@ static void judge_line_particles(const gps_study_t *s, table_t runs, verdict_t *
     (void)add_reference(distance, gps_reference_to_kf(s));
     ratio->reference = gps_is_standard(s) && s->kernel ? 1.0 : MISSING;
     if (stated && gps_is_standard(s)) {
-        accept(ratio, 0.97, 1.03);
-        accept(distance, 0.0, coloured ? 0.06 : 0.15);
+        metric_accept(ratio, 0.97, 1.03);
+        metric_accept(distance, 0.0, coloured ? 0.06 : 0.15);
         if (runs.n >= RUNS_FOR_RATIO_RAW) {
-            accept(over_raw, 0.0, 0.43);
+            metric_accept(over_raw, 0.0, 0.43);
         }
     }
     if (stated && s->white && !coloured && s->axes == 1 && gps_is_value(s->accuracy_m, 1.5)) {
-        accept(ratio, 0.99, 1.01);
+        metric_accept(ratio, 0.99, 1.01);
     }
     if (gps_is_standard(s)) {
         text_add(&verdict->notes,
@@ -123,7 +117,7 @@ static void judge_line(const gps_study_t *s, table_t runs, verdict_t *verdict, m
             ratio->reference = s->filter == GPS_PF_COLOURED ? 0.613 / 0.686 : 0.6288 / 0.7128;
             if (runs.n >= RUNS_FOR_ACCEPTANCE &&
                 (s->filter == GPS_KF_COLOURED || (s->particles == 1000u && s->kernel))) {
-                accept(ratio, 0.0, 0.93);
+                metric_accept(ratio, 0.0, 0.93);
             }
         }
         text_add(&verdict->notes,
@@ -139,12 +133,12 @@ static void accept_curve(const gps_study_t *s, metric_t *rmse, metric_t *over_tu
         return;
     }
     if (s->filter == GPS_KF && !s->longrun) {
-        accept(rmse, 10.0, (double)INFINITY);
+        metric_accept(rmse, 10.0, (double)INFINITY);
     }
     if (s->filter == GPS_PF_COLOURED && s->particles == 1000u && !s->kernel && over_tuned != NULL) {
-        accept(rmse, 0.0, 1.16);
-        accept(over_tuned, 0.0, 0.95);
-        accept(lost, 0.0, 0.0);
+        metric_accept(rmse, 0.0, 1.16);
+        metric_accept(over_tuned, 0.0, 0.95);
+        metric_accept(lost, 0.0, 0.0);
     }
 }
 
@@ -153,8 +147,8 @@ static void accept_radar(const gps_study_t *s, metric_t *rmse, metric_t *lost)
     const bool coarse = s->variant == GPS_RADAR_COARSE;
 
     if (s->filter == GPS_PF && !s->kernel && s->particles == (coarse ? 2000u : 1000u)) {
-        accept(rmse, 0.0, coarse ? 1.85 : 0.54);
-        accept(lost, 0.0, 0.0);
+        metric_accept(rmse, 0.0, coarse ? 1.85 : 0.54);
+        metric_accept(lost, 0.0, 0.0);
     }
 }
 

@@ -1,5 +1,6 @@
 /* The Kalman filters of the scenario `gps`: each axis is a filter of its own, as nothing couples them. The document's,
  * the same with a believed acceleration, and the one whose state holds the GPS error. */
+#include "cloud.h"
 #include "gps.h"
 #include "kalman.h"
 
@@ -173,7 +174,7 @@ bool gps_kalman(const gps_study_t *study, bool coloured, double acceleration, co
             }
             if (k > 0u) {
                 const uint32_t cycles = (pfl_port_cycles() - begin) & pfl_port_cycles_mask();
-                estimate->cycles_ns[k - 1u] += (uint32_t)((double)cycles * 1e9 / (double)pfl_port_cycles_hz());
+                estimate->cycles_ns[k - 1u] += cycle_ns(cycles);
             }
             keep(&axis, track, k, a, study->axes, estimate);
         }

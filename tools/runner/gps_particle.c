@@ -8,8 +8,6 @@
 #include <stdlib.h>
 #include <string.h>
 
-#define CLOUD_EVERY 20u /* samples */
-
 enum { SENSOR_POSITION, SENSOR_DIFFERENCE, SENSOR_VELOCITY };
 
 /* A status below zero is an error; gate and budget are off, so there are no refusals. */
@@ -114,10 +112,25 @@ static void keep_turn(unsigned k, const float *mean, gps_estimate_t *estimate)
     estimate->velocity[k][1] = v * sin((double)mean[PFL_TURN_HEADING]);
 }
 
-static bool fly(const gps_particles_t *p, const pfl_config_t *config, pfl_t *filter, gps_estimate_t *estimate,
-                text_t *cloud, failure_t *failure)
+/* On a line of one axis its speed stands across it. */
+static void show(const gps_particles_t *p, unsigned k, const float *mean, const pfl_t *filter, look_t *look)
 {
-    const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
+    const bool plane = p->study->axes > 1;
+    const gps_track_t *track = p->track;
+    const look_at_t at = {
+        .t_s = GPS_PERIOD_S * (double)k,
+        .state = {1u, 0u},
+        .axis = {plane ? "east [m]" : "speed [m/s]", "north [m]"},
+        .truth = {plane ? track->position[k][1] : track->velocity[k][0], track->position[k][0]},
+        .estimate = {(double)mean[1], (double)mean[0]},
+    };
+
+    look_take(look, filter, &at);
+}
+
+static bool fly(const gps_particles_t *p, const pfl_config_t *config, pfl_t *filter, gps_estimate_t *estimate,
+                look_t *look, failure_t *failure)
+{
     const bool line = p->study->variant == GPS_LINE;
     float mean[PFL_STATES_MAX];
     float cov[PFL_STATES_MAX * PFL_STATES_MAX];
@@ -136,19 +149,16 @@ static bool fly(const gps_particles_t *p, const pfl_config_t *config, pfl_t *fil
             keep_turn(k, mean, estimate);
         }
         if (k > 0u) {
-            estimate->cycles_ns[k - 1u] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
+            estimate->cycles_ns[k - 1u] = cycle_ns(health.cycles_last);
             estimate->cycle[k - 1u] = cycle_of(&health);
         }
-        if (k % CLOUD_EVERY ==
-            0u) { /* the first two states: north and speed on a line of one axis, else north and east */
-            cloud_take(cloud, "pf", GPS_PERIOD_S * (double)k, filter, 0u, 1u);
-        }
+        show(p, k, mean, filter, look);
     }
     return true;
 }
 
 bool gps_particle_filter(const gps_study_t *study, bool coloured, uint32_t run, const gps_track_t *track,
-                         gps_estimate_t *estimate, text_t *cloud, failure_t *failure)
+                         gps_estimate_t *estimate, look_t *look, failure_t *failure)
 {
     gps_particles_t particles;
     pfl_t *filter;
@@ -165,7 +175,7 @@ bool gps_particle_filter(const gps_study_t *study, bool coloured, uint32_t run, 
         return fail(failure, EXIT_HARNESS, "no memory for %lu particles", (unsigned long)study->particles);
     }
     const bool flown = check(pfl_init(arena, bytes, &config, 0u, &filter), "pfl_init", 0u, failure) &&
-                       fly(&particles, &config, filter, estimate, cloud, failure);
+                       fly(&particles, &config, filter, estimate, look, failure);
     free(arena);
     return flown;
 }

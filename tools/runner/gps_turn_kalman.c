@@ -1,5 +1,6 @@
 /* The extended Kalman filter with the turn model, on GPS or radar: the yardstick of the particle filter there. States as
  * pfl_turn_predict has them. */
+#include "cloud.h"
 #include "gps.h"
 #include "kalman.h"
 
@@ -132,7 +133,7 @@ bool gps_turn_kalman(const gps_study_t *study, const gps_track_t *track, gps_est
             return fail(failure, EXIT_HARNESS, "step %u: the innovation covariance is singular", k);
         }
         const uint32_t cycles = (pfl_port_cycles() - begin) & pfl_port_cycles_mask();
-        estimate->cycles_ns[k - 1u] = (uint32_t)((double)cycles * 1e9 / (double)pfl_port_cycles_hz());
+        estimate->cycles_ns[k - 1u] = cycle_ns(cycles);
         estimate->position[k][0] = belief.x[X];
         estimate->position[k][1] = belief.x[Y];
         estimate->velocity[k][0] = belief.x[V] * cos(belief.x[PSI]);

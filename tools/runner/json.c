@@ -148,7 +148,25 @@ static void add_special(text_t *text, const study_t *study)
     text_add(text, "]");
 }
 
-void json_summary_study(const outcome_t *outcome, const char *id, bool cloud, text_t *text)
+static void add_file(text_t *text, const char *name, bool is_there, const char *id, const char *suffix)
+{
+    if (is_there) {
+        text_add(text, ",\"%s\":\"csv/%s.%s\"", name, id, suffix);
+    } else {
+        text_add(text, ",\"%s\":null", name);
+    }
+}
+
+void json_look(const study_t *study, const plan_t *plan, uint32_t run, text_t *text)
+{
+    text_add(text, "{\"schema\":1,\"scenario\":");
+    json_string(text, study->scenario->name);
+    add_settings(text, study);
+    text_add(text, ",\"run\":%lu", (unsigned long)run);
+    add_named(text, ",", "budget_us", study->budget_us > 0.0 ? study->budget_us : plan->budget_us);
+}
+
+void json_summary_study(const outcome_t *outcome, const char *id, const traced_t *traced, text_t *text)
 {
     add_study(text, outcome, true);
     text_add(text, ",\"accepted\":%s,\"id\":", outcome_is_accepted(outcome) ? "true" : "false");
@@ -160,11 +178,8 @@ void json_summary_study(const outcome_t *outcome, const char *id, bool cloud, te
     json_string(text, outcome->study->budget_us > 0.0 ? "" : outcome->plan->budget_reason);
     add_named(text, ",", "elapsed_s", outcome->elapsed_s);
     text_add(text, ",\"csv\":\"csv/%s.csv\",\"trace\":\"csv/%s.trace.csv\"", id, id);
-    if (cloud) {
-        text_add(text, ",\"cloud\":\"csv/%s.cloud.csv\"", id);
-    } else {
-        text_add(text, ",\"cloud\":null");
-    }
+    add_file(text, "cloud", traced->cloud, id, "cloud.csv");
+    add_file(text, "look", traced->look, id, "look.jsonl");
     add_notes(text, outcome->verdict.notes.bytes);
     text_add(text, "}");
 }

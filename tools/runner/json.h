@@ -2,6 +2,7 @@
 #ifndef RUNNER_JSON_H
 #define RUNNER_JSON_H
 
+#include "execute.h"
 #include "render.h"
 
 /* A string with its quotes. */
@@ -11,7 +12,10 @@ void json_string(text_t *text, const char *string);
 void json_study(const outcome_t *outcome, text_t *text);
 
 /* The same object with more in it, for the summary: the paper's figure, the reference and the acceptance of each
- * metric, times of the resampling, notes, and the files beside the summary. `cloud`: there is one. */
-void json_summary_study(const outcome_t *outcome, const char *id, bool cloud, text_t *text);
+ * metric, times of the resampling, notes, and the files beside the summary. */
+void json_summary_study(const outcome_t *outcome, const char *id, const traced_t *traced, text_t *text);
+
+/* What is looked at (look.h): the beginning of its first line. */
+void json_look(const study_t *study, const plan_t *plan, uint32_t run, text_t *text);
 
 #endif

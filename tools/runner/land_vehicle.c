@@ -119,11 +119,11 @@ static void fill_trace(const land_track_t *track, const land_estimate_t *estimat
 }
 
 static bool filter_track(const land_study_t *s, uint32_t run, const land_track_t *track, land_estimate_t *estimate,
-                         failure_t *failure)
+                         look_t *look, failure_t *failure)
 {
     switch (s->filter) {
     case LAND_PF:
-        return land_particle_filter(s, run, track, estimate, failure);
+        return land_particle_filter(s, run, track, estimate, look, failure);
     case LAND_UKF:
         return land_unscented_filter(s, s->tuning, track, estimate, failure);
     case LAND_KF:
@@ -158,7 +158,8 @@ static bool run_once(const plan_t *plan, uint32_t run, run_output_t *out, failur
 
     memset(&estimate, 0, sizeof estimate);
     land_make_track(s, run, &track);
-    if (!filter_track(s, run, &track, &estimate, failure) || !score_baselines(s, &track, out->value, failure)) {
+    if (!filter_track(s, run, &track, &estimate, out->look, failure) ||
+        !score_baselines(s, &track, out->value, failure)) {
         return false;
     }
     out->value[LAND_ETA] = score(&track, &estimate, out->series);

@@ -76,7 +76,7 @@ void land_make_track(const land_study_t *study, uint32_t run, land_track_t *trac
 /* ---- land_vehicle_pf.c, land_vehicle_baselines.c: the filters ------------------------------------------------------ */
 
 bool land_particle_filter(const land_study_t *study, uint32_t run, const land_track_t *track, land_estimate_t *estimate,
-                          failure_t *failure);
+                          look_t *look, failure_t *failure);
 
 /* With a known start the exact Kalman filter: speed and heading have no variance, none of their Jacobian's columns
  * counts, and each position axis is the scalar filter. With an uncertain start the extended Kalman filter. */

@@ -1,4 +1,5 @@
 /* The land vehicle's Kalman filter and unscented Kalman filter, well and badly tuned. */
+#include "cloud.h"
 #include "kalman.h"
 #include "land_vehicle.h"
 #include "ukf.h"
@@ -127,7 +128,7 @@ static bool fly(believed_t *b, bool (*step)(believed_t *, unsigned, const double
         }
         memcpy(estimate->x[k], b->belief.x, sizeof estimate->x[k]);
         const uint32_t passed = (pfl_port_cycles() - begin) & pfl_port_cycles_mask();
-        estimate->cycles_ns[k - 1u] = (uint32_t)((double)passed * 1e9 / (double)pfl_port_cycles_hz());
+        estimate->cycles_ns[k - 1u] = cycle_ns(passed);
     }
     return true;
 }

@@ -44,15 +44,9 @@ static bool is_page_pf(const land_study_t *s)
     return s->resampling == pfl_systematic && (is_value(s->theta, 0.5f) || is_value(s->theta, 1.0f));
 }
 
-static void accept(metric_t *metric, double lo, double hi)
-{
-    metric->lo = lo;
-    metric->hi = hi;
-}
-
 static void accept_within(metric_t *metric, double share)
 {
-    accept(metric, metric->reference * (1.0 - share), metric->reference * (1.0 + share));
+    metric_accept(metric, metric->reference * (1.0 - share), metric->reference * (1.0 + share));
 }
 
 /* eta scatters by 0.9 % over batches of 100 runs. */
@@ -76,7 +70,7 @@ static void judge_pf_ratio(const land_study_t *s, size_t runs, metric_t *ratio)
     ratio->reference = 1.0 + 2.2 / n;
     if (runs >= RUNS_FOR_ACCEPTANCE) {
         /* From 1000 particles on the scatter is of the size of the excess. */
-        accept(ratio, s->particles <= 1000u ? 1.0 : 0.999, s->particles < 1000u ? 1.0 + 4.5 / n : 1.006);
+        metric_accept(ratio, s->particles <= 1000u ? 1.0 : 0.999, s->particles < 1000u ? 1.0 + 4.5 / n : 1.006);
     }
 }
 

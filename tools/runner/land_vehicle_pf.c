@@ -114,10 +114,22 @@ static bool check(pfl_status_t status, const char *call, unsigned k, failure_t *
     return status >= 0 || fail(failure, EXIT_HARNESS, "step %u: %s: %s", k, call, pfl_status_string(status));
 }
 
-static bool fly(const land_study_t *study, pfl_t *filter, const land_track_t *track, land_estimate_t *estimate,
-                failure_t *failure)
+static void show(const land_track_t *track, unsigned k, const double *x, const pfl_t *filter, look_t *look)
 {
-    const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
+    const look_at_t at = {
+        .t_s = LAND_PERIOD_S * (double)k,
+        .state = {PFL_LAND_EAST, PFL_LAND_NORTH},
+        .axis = {"east [m]", "north [m]"},
+        .truth = {track->truth[k][PFL_LAND_EAST], track->truth[k][PFL_LAND_NORTH]},
+        .estimate = {x[PFL_LAND_EAST], x[PFL_LAND_NORTH]},
+    };
+
+    look_take(look, filter, &at);
+}
+
+static bool fly(const land_study_t *study, pfl_t *filter, const land_track_t *track, land_estimate_t *estimate,
+                look_t *look, failure_t *failure)
+{
     pfl_health_t health;
 
     for (unsigned k = 1u; k <= LAND_STEPS; k++) {
@@ -136,14 +148,15 @@ static bool fly(const land_study_t *study, pfl_t *filter, const land_track_t *tr
         for (int d = 0; d < PFL_LAND_STATES; d++) {
             estimate->x[k][d] = (double)mean[d];
         }
-        estimate->cycles_ns[k - 1u] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
+        estimate->cycles_ns[k - 1u] = cycle_ns(health.cycles_last);
         estimate->cycle[k - 1u] = cycle_of(&health);
+        show(track, k, estimate->x[k], filter, look);
     }
     return true;
 }
 
 bool land_particle_filter(const land_study_t *study, uint32_t run, const land_track_t *track, land_estimate_t *estimate,
-                          failure_t *failure)
+                          look_t *look, failure_t *failure)
 {
     model_t model;
     set_model(study, &model);
@@ -156,7 +169,7 @@ bool land_particle_filter(const land_study_t *study, uint32_t run, const land_tr
         return fail(failure, EXIT_HARNESS, "no memory for %lu particles", (unsigned long)study->particles);
     }
     const bool flown = check(pfl_init(arena, bytes, &config, 0u, &filter), "pfl_init", 0u, failure) &&
-                       fly(study, filter, track, estimate, failure);
+                       fly(study, filter, track, estimate, look, failure);
     free(arena);
     return flown;
 }

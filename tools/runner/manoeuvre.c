@@ -161,11 +161,24 @@ typedef struct {
     float probability[STEPS]; /* of turning */
 } estimate_t;
 
+/* Both models, to be looked at. */
+static void show(const track_t *t, uint32_t k, const float *mean, const pfl_t *f, look_t *look)
+{
+    const look_at_t at = {
+        .t_s = PERIOD_S * (double)(k + 1u),
+        .state = {PFL_CV_X, PFL_CV_Y},
+        .axis = {"x [m]", "y [m]"},
+        .truth = {t->x[k], t->y[k]},
+        .estimate = {(double)mean[PFL_CV_X], (double)mean[PFL_CV_Y]},
+    };
+
+    look_take(look, f, &at);
+}
+
 static bool fly(const manoeuvre_study_t *s, uint32_t run, int which, const track_t *t, estimate_t *e, run_output_t *out,
                 failure_t *failure)
 {
     static const uint64_t period_us = (uint64_t)(PERIOD_S * 1e6);
-    const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
     model_t m;
     set_model(s, run, which, t, &m);
     const size_t bytes = pfl_arena_bytes(&m.config);
@@ -189,8 +202,9 @@ static bool fly(const manoeuvre_study_t *s, uint32_t run, int which, const track
         memcpy(e->x[k], mean, sizeof e->x[k]);
         e->probability[k] = probability[1];
         if (which == TWO && status == PFL_OK && pfl_health(f, &health) == PFL_OK) {
-            out->cycles_ns[k] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
+            out->cycles_ns[k] = cycle_ns(health.cycles_last);
             out->cycle[k] = cycle_of(&health);
+            show(t, k, mean, f, out->look);
         }
     }
     free(arena);
@@ -241,39 +255,28 @@ static bool run_once(const plan_t *plan, uint32_t run, run_output_t *out, failur
     return true;
 }
 
-static figure_t root_of(figure_t square)
-{
-    const double root = sqrt(square.mean);
-    return (figure_t){root, square.error / (2.0 * root)};
-}
-
 static void judge(const plan_t *plan, table_t runs, verdict_t *verdict)
 {
     static const char *const wheres[] = {"rmse_m_straight", "rmse_m_turning", "rmse_m"};
-    static char labels[3u * FILTERS][32];
     const manoeuvre_study_t *s = plan->own;
     const bool judged = s->particles == JUDGED_PARTICLES && runs.n >= JUDGED_RUNS && fabs(s->accel - 4.5) < 1e-6;
-    const double bound = root_of(stats_mean(runs, ALL + ONE)).mean;
+    const double bound = stats_root(stats_mean(runs, ALL + ONE)).mean;
 
     for (size_t where = 0u; where < 3u; where++) {
         for (size_t k = 0u; k < FILTERS; k++) {
-            char *label = labels[where * FILTERS + k];
             const size_t column = where * FILTERS + k;
             const figure_t square = where == 2u
                                         ? stats_mean(runs, column)
                                         : stats_ratio(runs, column, where == 0u ? STEPS_STRAIGHT : STEPS_TURNING);
-            (void)snprintf(label, sizeof labels[0], "%s_%s", wheres[where], names[k]);
-            metric_t *metric = verdict_add(verdict, label, root_of(square));
+            metric_t *metric = verdict_add_of(verdict, wheres[where], names[k], stats_root(square));
             if (judged && where == 2u && k == TWO) {
-                metric->lo = 0.0;
-                metric->hi = 0.9 * bound;
+                metric_accept(metric, 0.0, 0.9 * bound);
             }
         }
     }
     metric_t *told = verdict_add(verdict, "regime_told", stats_mean(runs, TOLD));
     if (judged) {
-        told->lo = 0.75;
-        told->hi = 1.0;
+        metric_accept(told, 0.75, 1.0);
     }
     text_add(&verdict->notes,
              "calm, wild: one model each; one: the best single compromise; two: both, each particle by its "

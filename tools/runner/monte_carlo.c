@@ -93,6 +93,7 @@ void results_free(results_t *results)
     free(results->hash);
     free(results->trace);
     text_free(&results->cloud);
+    text_free(&results->look.text);
     memset(results, 0, sizeof *results);
 }
 
@@ -150,6 +151,7 @@ bool monte_carlo_trace(const study_t *study, const plan_t *plan, uint32_t run, r
     run_output_t out = output_of(results, plan, 0u);
     out.trace = results->trace;
     out.cloud = &results->cloud;
+    out.look = &results->look;
     if (!study->scenario->run(plan, run, &out, &inner)) {
         results_free(results);
         return fail(failure, EXIT_HARNESS, "%s: run %lu: %s", study->scenario->name, (unsigned long)run, inner.text);

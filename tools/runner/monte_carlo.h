@@ -13,13 +13,15 @@ typedef struct {
     uint64_t *hash;      /* runs */
     double *trace;       /* of a traced run: plan.steps x plan.trace_columns; else null */
     text_t cloud;        /* of a traced run; may be empty */
+    look_t look;         /* likewise */
 } results_t;
 
 /* On failure (of the run with the lowest number that failed) the results are empty. */
 bool monte_carlo(const study_t *study, const plan_t *plan, unsigned threads, results_t *results, failure_t *failure);
 void results_free(results_t *results);
 
-/* One run, traced. Its results are those of a single run; trace and cloud are filled too. */
+/* One run, traced. Its results are those of a single run; trace, cloud and look, which the caller sets up, are filled
+ * too. */
 bool monte_carlo_trace(const study_t *study, const plan_t *plan, uint32_t run, results_t *results, failure_t *failure);
 
 #endif

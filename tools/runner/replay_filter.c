@@ -321,6 +321,17 @@ static bool restart(const replay_study_t *s, setup_t *u, pfl_t *filter, size_t i
     }
     make_model(s, i, &u->model, &u->config);
     return check(pfl_reset(filter, s->event[i].t_us), "pfl_reset", i, failure);
+static void show(const replay_event_t *e, const float *mean, const pfl_t *filter, look_t *look)
+{
+    const look_at_t at = {
+        .t_s = e->t_s,
+        .state = {0u, 1u},
+        .axis = {"x [m]", "y [m]"},
+        .truth = {e->truth[0], e->truth[1]},
+        .estimate = {(double)mean[0], (double)mean[1]},
+    };
+
+    look_take(look, filter, &at);
 }
 
 static bool cycle(const replay_study_t *s, const setup_t *u, pfl_t *filter, size_t i, run_output_t *out, sums_t *sums,
@@ -354,8 +365,9 @@ static bool cycle(const replay_study_t *s, const setup_t *u, pfl_t *filter, size
     score_estimate(s, e, mean, cov, states, row, sums);
     sums->ess += (double)health.ess;
     out->hash = hash_floats(out->hash, mean, states);
-    out->cycles_ns[i] = (uint32_t)((double)health.cycles_last * 1e9 / (double)pfl_port_cycles_hz());
+    out->cycles_ns[i] = cycle_ns(health.cycles_last);
     out->cycle[i] = cycle_of(&health);
+    show(e, mean, filter, out->look);
     out->value[REPLAY_REJECTED] = (double)health.rejected;
     out->value[REPLAY_RESTARTS] = (double)health.resets;
     if (out->series != NULL) {

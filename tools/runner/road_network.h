@@ -55,4 +55,8 @@ void road_filter_close(road_filter_t *r);
 bool road_filter_step(road_filter_t *r, unsigned k, const standoff_sight_t *sight, standoff_belief_t *belief,
                       double *lorry, uint32_t *cycles_ns, cycle_t *cycle, failure_t *failure);
 
+/* The step, to be looked at. */
+void road_filter_show(const road_filter_t *r, unsigned k, const double *target, const standoff_belief_t *belief,
+                      look_t *look);
+
 #endif

@@ -238,7 +238,22 @@ bool road_filter_step(road_filter_t *r, unsigned k, const standoff_sight_t *sigh
     }
     belief->reach_m = (double)reach_m;
     *lorry = r->streets ? (double)mean[REGIME] : 0.0;
-    *cycles_ns = (uint32_t)((double)health.cycles_last * 1e9 / (double)pfl_port_cycles_hz());
+    *cycles_ns = cycle_ns(health.cycles_last);
     *cycle = cycle_of(&health);
     return true;
+}
+
+void road_filter_show(const road_filter_t *r, unsigned k, const double *target, const standoff_belief_t *belief,
+                      look_t *look)
+{
+    const uint16_t first = r->streets ? PFL_ROAD_X : 0u;
+    const look_at_t at = {
+        .t_s = STANDOFF_PERIOD_S * (double)k,
+        .state = {first, (uint16_t)(first + 1u)},
+        .axis = {"x [m]", "y [m]"},
+        .truth = {target[TARGET_X], target[TARGET_Y]},
+        .estimate = {belief->target[TARGET_X], belief->target[TARGET_Y]},
+    };
+
+    look_take(look, r->filter, &at);
 }

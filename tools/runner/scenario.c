@@ -120,3 +120,24 @@ metric_t *verdict_add(verdict_t *verdict, const char *name, figure_t ours)
     *metric = (metric_t){name, ours, MISSING, MISSING, MISSING, MISSING};
     return metric;
 }
+
+metric_t *verdict_add_of(verdict_t *verdict, const char *what, const char *whose, figure_t ours)
+{
+    metric_t *metric = verdict_add(verdict, NULL, ours);
+    char *name = verdict->name[verdict->count - 1u];
+
+    (void)snprintf(name, sizeof verdict->name[0], "%s_%s", what, whose);
+    metric->name = name;
+    return metric;
+}
+
+metric_t *verdict_add_typical(verdict_t *verdict, const char *name, table_t runs, size_t column)
+{
+    return verdict_add(verdict, name, runs.n > 1u ? stats_median(runs, column) : stats_mean(runs, column));
+}
+
+void metric_accept(metric_t *metric, double lo, double hi)
+{
+    metric->lo = lo;
+    metric->hi = hi;
+}

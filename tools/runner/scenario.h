@@ -4,6 +4,7 @@
 #define RUNNER_SCENARIO_H
 
 #include "failure.h"
+#include "look.h"
 #include "stats.h"
 #include "text.h"
 
@@ -84,6 +85,7 @@ typedef struct {
     uint64_t hash;       /* over the filter's estimates, from HASH_START on */
     double *trace;       /* plan.steps x plan.trace_columns, row by row; null unless this run is traced */
     text_t *cloud;       /* for cloud_take (cloud.h); null unless this run is traced */
+    look_t *look;        /* for look_take; likewise */
 } run_output_t;
 
 /* A line of the table. What does not exist is MISSING. */
@@ -97,12 +99,22 @@ typedef struct {
 
 typedef struct {
     metric_t metric[METRICS_MAX];
+    char name[METRICS_MAX][32]; /* of those whose name is put together */
     size_t count;
     text_t notes; /* what the reader should know beside the figures: plain lines */
 } verdict_t;
 
 /* Adds a metric without paper, reference and acceptance, to be filled in. */
 metric_t *verdict_add(verdict_t *verdict, const char *name, figure_t ours);
+
+/* The same, as WHAT_WHOSE: one figure of many filters. */
+metric_t *verdict_add_of(verdict_t *verdict, const char *what, const char *whose, figure_t ours);
+
+/* The median of several runs, or the value of a single one. */
+metric_t *verdict_add_typical(verdict_t *verdict, const char *name, table_t runs, size_t column);
+
+/* What is accepted of it, both ends included. */
+void metric_accept(metric_t *metric, double lo, double hi);
 
 /* One of the studies that `tools/run` alone makes. */
 typedef struct {

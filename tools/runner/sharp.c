@@ -29,11 +29,8 @@ enum { BOOTSTRAP, LARGE, TEMPERED, AUXILIARY, OPTIMAL, ADAPTED, FILTERS };
 enum { KALMAN = 2 * FILTERS, VALUES };
 /* Values of a run: distance of each filter, then the errors against the truth, the Kalman filter's last. */
 
-static const char *const distances[FILTERS] = {"distance_bootstrap", "distance_bootstrap_10n", "distance_tempered",
-                                               "distance_auxiliary", "distance_optimal",       "distance_adapted"};
-static const char *const errors[FILTERS + 1] = {"rmse_m_bootstrap", "rmse_m_bootstrap_10n", "rmse_m_tempered",
-                                                "rmse_m_auxiliary", "rmse_m_optimal",       "rmse_m_adapted",
-                                                "rmse_m_kalman"};
+static const char *const names[FILTERS + 1] = {"bootstrap", "bootstrap_10n", "tempered", "auxiliary",
+                                               "optimal",   "adapted",       "kalman"};
 
 static const setting_t settings[] = {
     {"sigma", NULL, 1e-3, 10.0, "0.02", "standard deviation of the measured position [m]"},
@@ -241,6 +238,20 @@ static pfl_status_t cycle(pfl_t *f, const model_t *m, uint64_t t_us, const float
     return s == PFL_OK ? pfl_estimate(f, mean, NULL) : s;
 }
 
+/* The optimal one, to be looked at. */
+static void show(const track_t *t, uint32_t k, const float *mean, const pfl_t *f, look_t *look)
+{
+    const look_at_t at = {
+        .t_s = PERIOD_S * (double)(k + 1u),
+        .state = {PFL_CV_X, PFL_CV_Y},
+        .axis = {"x [m]", "y [m]"},
+        .truth = {t->truth[k][0], t->truth[k][1]},
+        .estimate = {(double)mean[PFL_CV_X], (double)mean[PFL_CV_Y]},
+    };
+
+    look_take(look, f, &at);
+}
+
 /* One filter over the track: its estimates, and the times of the optimal one. */
 static bool fly(const sharp_study_t *s, uint32_t run, int which, const track_t *t, float (*estimate)[2],
                 run_output_t *out, failure_t *failure)
@@ -248,7 +259,6 @@ static bool fly(const sharp_study_t *s, uint32_t run, int which, const track_t *
     model_t m;
     set_model(s, run, which, &m);
     const size_t bytes = pfl_arena_bytes(&m.config);
-    const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
     void *arena = malloc(bytes);
     pfl_t *f = NULL;
 
@@ -262,12 +272,13 @@ static bool fly(const sharp_study_t *s, uint32_t run, int which, const track_t *
         status = cycle(f, &m, (uint64_t)(k + 1u) * PERIOD_US, t->z[k], mean);
         memcpy(estimate[k], mean, sizeof estimate[k]);
         if (which == OPTIMAL && pfl_health(f, &health) == PFL_OK) {
-            out->cycles_ns[k] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
+            out->cycles_ns[k] = cycle_ns(health.cycles_last);
             out->cycle[k] = cycle_of(&health);
+            show(t, k, mean, f, out->look);
         }
     }
     free(arena);
-    return status == PFL_OK || fail(failure, EXIT_HARNESS, "%s: %s", errors[which], pfl_status_string(status));
+    return status == PFL_OK || fail(failure, EXIT_HARNESS, "%s: %s", names[which], pfl_status_string(status));
 }
 
 /* ---- Runs --------------------------------------------------------------------------------------------------------------- */
@@ -340,14 +351,13 @@ static void judge(const plan_t *plan, table_t runs, verdict_t *verdict)
                         s->sigma > 0.019 && s->accel < 1.01 && s->accel > 0.99;
 
     for (size_t k = 0u; k < FILTERS; k++) {
-        metric_t *metric = verdict_add(verdict, distances[k], stats_median(runs, k));
+        metric_t *metric = verdict_add_of(verdict, "distance", names[k], stats_median(runs, k));
         if (judged && (k == AUXILIARY || k == OPTIMAL || k == ADAPTED)) {
-            metric->lo = 0.0;
-            metric->hi = k == AUXILIARY ? same : large;
+            metric_accept(metric, 0.0, k == AUXILIARY ? same : large);
         }
     }
     for (size_t k = 0u; k <= FILTERS; k++) {
-        verdict_add(verdict, errors[k], stats_median(runs, FILTERS + k));
+        verdict_add_of(verdict, "rmse_m", names[k], stats_median(runs, FILTERS + k));
     }
     text_add(&verdict->notes,
              "Distances are those of the estimated position from the Kalman filter's, which is exact here, "

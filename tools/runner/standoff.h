@@ -126,6 +126,10 @@ void standoff_pf_close(standoff_pf_t *pf);
 bool standoff_pf_step(standoff_pf_t *pf, unsigned k, const standoff_sight_t *sight, standoff_belief_t *belief,
                       uint32_t *cycles_ns, cycle_t *cycle, failure_t *failure);
 
+/* The step, to be looked at; on a lane, whose particles are no points of the plane, nothing. */
+void standoff_pf_show(const standoff_pf_t *pf, unsigned k, const double *target, const standoff_belief_t *belief,
+                      look_t *look);
+
 /* Draws per particle and step, share of particles that fell back, share of those with weight that were off the road. */
 void standoff_pf_counts(const standoff_pf_t *pf, double *draws, double *fallback, double *off_road);
 

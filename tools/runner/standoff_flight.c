@@ -1,4 +1,5 @@
 /* The closed loop of `standoff`, and what is measured on it. */
+#include "cloud.h"
 #include "hash.h"
 #include "standoff.h"
 
@@ -151,7 +152,7 @@ static bool filter_step(flight_t *f, unsigned k, uint32_t *cycles_ns, cycle_t *c
     const uint32_t begin = pfl_port_cycles();
     const bool done = standoff_ekf_step(f->s, visible ? sight : NULL, &f->ekf, &f->belief);
     const uint32_t passed = (pfl_port_cycles() - begin) & pfl_port_cycles_mask();
-    *cycles_ns = (uint32_t)((double)passed * 1e9 / (double)pfl_port_cycles_hz());
+    *cycles_ns = cycle_ns(passed);
     return done || fail(failure, EXIT_HARNESS, "step %u: the innovation covariance is singular", k);
 }
 
@@ -168,6 +169,7 @@ static bool fly(flight_t *f, run_output_t *out, failure_t *failure)
         if (out != NULL) {
             out->cycles_ns[k - 1u] = cycles_ns;
             out->cycle[k - 1u] = cycle;
+            standoff_pf_show(f->pf, k, f->track->target[k], &f->belief, out->look);
             for (int d = 0; d < TARGET_STATES; d++) {
                 const float x = (float)f->belief.target[d];
                 out->hash = hash_floats(out->hash, &x, 1u);

@@ -63,8 +63,7 @@ static metric_t *add(const standoff_study_t *s, verdict_t *verdict, size_t runs,
     metric->paper = s->calm ? MISSING : reference->paper;
     metric->reference = s->calm ? reference->calm : reference->ours;
     if (!isnan(limit) && runs >= RUNS_FOR_ACCEPTANCE) {
-        metric->lo = 0.0;
-        metric->hi = limit;
+        metric_accept(metric, 0.0, limit);
     }
     return metric;
 }
@@ -120,12 +119,10 @@ static void add_particles(const standoff_study_t *s, table_t runs, verdict_t *ve
     metric_t *off_road = add(s, verdict, runs.n, STANDOFF_OFF_ROAD, "off_road", stats_mean(runs, STANDOFF_OFF_ROAD));
 
     if (s->constrained) { /* by construction */
-        draws->lo = 1.0;
-        draws->hi = s->motion == MOTION_CV ? (double)s->tries : 1.0;
+        metric_accept(draws, 1.0, s->motion == MOTION_CV ? (double)s->tries : 1.0);
     }
     if (s->constrained && (s->motion != MOTION_CV || s->fallback < FALLBACK_WEIGHT)) {
-        off_road->lo = 0.0;
-        off_road->hi = 0.0;
+        metric_accept(off_road, 0.0, 0.0);
     }
 }
 
@@ -135,8 +132,7 @@ static void add_nmpc(const standoff_study_t *s, table_t runs, verdict_t *verdict
         const figure_t most = {extreme(runs, STANDOFF_EVALUATIONS_MAX, 1.0), MISSING};
         verdict_add(verdict, "nmpc_evaluations", stats_mean(runs, STANDOFF_EVALUATIONS));
         metric_t *bound = verdict_add(verdict, "nmpc_evaluations_max", most);
-        bound->lo = 1.0;
-        bound->hi = (double)PFL_NMPC_EVALUATIONS_MAX;
+        metric_accept(bound, 1.0, (double)PFL_NMPC_EVALUATIONS_MAX);
         text_add(&verdict->notes, "nmpc_evaluations: predictions in a call; the bound is fixed by its loops.\n");
     }
 }

@@ -364,11 +364,27 @@ bool standoff_pf_step(standoff_pf_t *pf, unsigned k, const standoff_sight_t *sig
         !count_off_road(pf, k, failure)) {
         return false;
     }
-    *cycles_ns = (uint32_t)((double)health.cycles_last * 1e9 / (double)pfl_port_cycles_hz());
+    *cycles_ns = cycle_ns(health.cycles_last);
     *cycle = cycle_of(&health);
     pf->in_sight = sight != NULL;
     pf->steps = k;
     return true;
+}
+
+void standoff_pf_show(const standoff_pf_t *pf, unsigned k, const double *target, const standoff_belief_t *belief,
+                      look_t *look)
+{
+    const look_at_t at = {
+        .t_s = STANDOFF_PERIOD_S * (double)k,
+        .state = {TARGET_X, TARGET_Y},
+        .axis = {"x [m]", "y [m]"},
+        .truth = {target[TARGET_X], target[TARGET_Y]},
+        .estimate = {belief->target[TARGET_X], belief->target[TARGET_Y]},
+    };
+
+    if (pf != NULL && pf->study->motion != MOTION_LANE) {
+        look_take(look, pf->filter, &at);
+    }
 }
 
 void standoff_pf_counts(const standoff_pf_t *pf, double *draws, double *fallback, double *off_road)

@@ -57,6 +57,28 @@ static int compare_doubles(const void *a, const void *b)
     return (x > y) - (x < y);
 }
 
+void stats_sort(double *x, size_t n)
+{
+    qsort(x, n, sizeof *x, compare_doubles);
+}
+
+figure_t stats_largest(table_t runs, size_t column)
+{
+    double largest = at(runs, 0u, column);
+
+    for (size_t r = 1u; r < runs.n; r++) {
+        largest = fmax(largest, at(runs, r, column));
+    }
+    return (figure_t){largest, MISSING};
+}
+
+figure_t stats_root(figure_t square)
+{
+    const double root = sqrt(square.mean);
+
+    return (figure_t){root, root > 0.0 ? square.error / (2.0 * root) : 0.0};
+}
+
 figure_t stats_median(table_t runs, size_t column)
 {
     const size_t n = runs.n;
@@ -69,7 +91,7 @@ figure_t stats_median(table_t runs, size_t column)
     for (size_t r = 0u; r < n; r++) {
         sorted[r] = at(runs, r, column);
     }
-    qsort(sorted, n, sizeof *sorted, compare_doubles);
+    stats_sort(sorted, n);
     median.mean = 0.5 * (sorted[(n - 1u) / 2u] + sorted[n / 2u]);
     if (n > 4u) {
         const size_t step = (size_t)(0.5 * sqrt((double)n));

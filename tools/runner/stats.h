@@ -33,6 +33,15 @@ figure_t stats_ratio(table_t runs, size_t above, size_t below);
  * sides: about one binomial standard deviation, whatever the distribution. MISSING when out of memory. */
 figure_t stats_median(table_t runs, size_t column);
 
+/* The largest of a column; it has no error. */
+figure_t stats_largest(table_t runs, size_t column);
+
+/* Square root of a mean square, with its standard error (delta method). */
+figure_t stats_root(figure_t square);
+
+/* Sorts n values. */
+void stats_sort(double *x, size_t n);
+
 /* Sorts n cycle times. */
 void stats_sort_u32(uint32_t *x, size_t n);
 

@@ -145,10 +145,22 @@ static bool cycle(const terrain_study_t *s, pfl_t *filter, model_t *model, size_
     return check(pfl_estimate(filter, mean, cov), "pfl_estimate", k, failure);
 }
 
+static void show(const terrain_row_t *row, const float *mean, const pfl_t *filter, look_t *look)
+{
+    const look_at_t at = {
+        .t_s = row->t_s,
+        .state = {PFL_DR_EAST, PFL_DR_NORTH},
+        .axis = {"east [m]", "north [m]"},
+        .truth = {row->truth_east_m, row->truth_north_m},
+        .estimate = {(double)mean[PFL_DR_EAST], (double)mean[PFL_DR_NORTH]},
+    };
+
+    look_take(look, filter, &at);
+}
+
 static bool fly(const terrain_study_t *s, pfl_t *filter, model_t *model, pfl_adaptive_t *adaptive,
                 terrain_estimate_t *estimate, run_output_t *out, failure_t *failure)
 {
-    const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
     float spread_m = START_SIGMA_M * 1.4142136f;
 
     for (size_t k = 0u; k < s->rows; k++) {
@@ -169,8 +181,9 @@ static bool fly(const terrain_study_t *s, pfl_t *filter, model_t *model, pfl_ada
         if (k % 20u == 0u && (k % 200u == 0u || (double)spread_m > CONVERGED_M)) {
             cloud_take(out->cloud, "pf", s->row[k].t_s, filter, PFL_DR_EAST, PFL_DR_NORTH);
         }
+        show(&s->row[k], mean, filter, out->look);
         if (k > 0u) {
-            out->cycles_ns[k - 1u] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
+            out->cycles_ns[k - 1u] = cycle_ns(health.cycles_last);
             out->cycle[k - 1u] = cycle_of(&health);
         }
     }

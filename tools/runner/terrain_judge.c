@@ -10,21 +10,10 @@
 #define OTHER_PARTICLES 2000u
 #define ADAPTIVE_SAVES 3.0 /* particles, once the aircraft is found */
 
-static double largest(table_t runs, size_t column)
-{
-    double most = 0.0;
-
-    for (size_t r = 0u; r < runs.n; r++) {
-        most = fmax(most, runs.table[r * runs.width + column]);
-    }
-    return most;
-}
-
 static void accept(metric_t *metric, bool judged, double lo, double hi)
 {
     if (judged) {
-        metric->lo = lo;
-        metric->hi = hi;
+        metric_accept(metric, lo, hi);
     }
 }
 
@@ -34,12 +23,11 @@ void terrain_judge(const plan_t *plan, table_t runs, verdict_t *verdict)
     const uint32_t most = s->filter == TERRAIN_RB ? MARGINAL_PARTICLES : OTHER_PARTICLES;
     const bool enough = s->adaptive ? s->particles == OTHER_PARTICLES : s->particles <= most;
     const bool judged = s->as_they_come && s->filter != TERRAIN_PLAIN && enough && runs.n >= SEEDS_FOR_MEDIAN;
-    const figure_t worst = {largest(runs, TERRAIN_WORST), (double)NAN};
 
     accept(verdict_add(verdict, "converged_share", stats_mean(runs, TERRAIN_CONVERGED)), judged, 1.0, 1.0);
     accept(verdict_add(verdict, "rmse_after_200s_m_median", stats_median(runs, TERRAIN_RMSE)), judged, 0.0,
            s->second ? 17.0 : 15.0);
-    verdict_add(verdict, "error_after_200s_m_worst", worst);
+    verdict_add(verdict, "error_after_200s_m_worst", stats_largest(runs, TERRAIN_WORST));
     verdict_add(verdict, "settled_s_median", stats_median(runs, TERRAIN_SETTLED_S));
     accept(verdict_add(verdict, "particles_after_200s_mean", stats_mean(runs, TERRAIN_PARTICLES)),
            judged && s->adaptive, 0.0, (double)s->particles / ADAPTIVE_SAVES);

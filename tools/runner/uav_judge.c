@@ -11,19 +11,6 @@ bool uav_is_value(double x, double value)
     return fabs(x - value) < 1e-9;
 }
 
-void uav_accept(metric_t *metric, double lo, double hi)
-{
-    metric->lo = lo;
-    metric->hi = hi;
-}
-
-figure_t uav_root(figure_t square)
-{
-    const double value = sqrt(square.mean);
-
-    return (figure_t){value, value > 0.0 ? square.error / (2.0 * value) : 0.0};
-}
-
 /* ---- Table 1 and the clouds: line, circle, winds ------------------------------------------------------------------- */
 
 /* The paper's Table 1, in the order of uav_table_wind. */
@@ -111,7 +98,7 @@ static void judge_clouds(const uav_study_t *s, table_t runs, verdict_t *verdict)
         }
         metric->reference = reference != NULL ? reference[i] : MISSING;
         if (has_enough_flights(s, runs)) {
-            uav_accept(metric, lo[i], hi[i]);
+            metric_accept(metric, lo[i], hi[i]);
         }
     }
 }
@@ -138,7 +125,7 @@ static void judge_by_wind(const uav_study_t *s, table_t runs, verdict_t *verdict
     for (size_t i = 0u; i < UAV_OF_WIND && runs.n > 1u; i++) {
         metric_t *f = verdict_add(verdict, f_name[i], variance_ratio(runs, i));
         if (has_enough_flights(s, runs)) {
-            uav_accept(f, 0.0, 3.8);
+            metric_accept(f, 0.0, 3.8);
         }
     }
     text_add(&verdict->notes,
@@ -149,12 +136,12 @@ static void judge_by_wind(const uav_study_t *s, table_t runs, verdict_t *verdict
 
 static void judge_estimate(const uav_study_t *s, table_t runs, verdict_t *verdict)
 {
-    metric_t *rms = verdict_add(verdict, "estimate_rms_m", uav_root(stats_mean(runs, UAV_SQUARE)));
+    metric_t *rms = verdict_add(verdict, "estimate_rms_m", stats_root(stats_mean(runs, UAV_SQUARE)));
 
     if (s->set.name == 'S' && s->fixes && s->wind_model == UAV_WIND_KNOWN && (s->as_page || s->ekf)) {
         rms->reference = s->ekf ? 0.60 : 0.58;
         if (has_enough_flights(s, runs) || (s->as_page && s->particles == 1000u && runs.n >= 50u)) {
-            uav_accept(rms, 0.0, 0.65);
+            metric_accept(rms, 0.0, 0.65);
         }
     }
 }
@@ -179,7 +166,7 @@ static void judge_spread(const uav_study_t *s, table_t runs, verdict_t *verdict)
         without->reference = sparse ? 3.02 : MISSING;
         ratio->reference = sparse && s->as_page ? 3.02 / 0.69 : MISSING;
         if (sparse && s->as_page && runs.n >= 50u) {
-            uav_accept(ratio, 3.5, (double)INFINITY);
+            metric_accept(ratio, 3.5, (double)INFINITY);
         }
     }
 }

@@ -50,7 +50,8 @@ static horizon_metrics_t add_horizon(table_t runs, unsigned h, unsigned second, 
                                      const ahead_t *page, verdict_t *verdict)
 {
     const horizon_metrics_t m = {
-        verdict_add(verdict, name_at("error", second, "_m"), uav_root(stats_mean(runs, of_horizon(h, UAV_OF_SQUARE)))),
+        verdict_add(verdict, name_at("error", second, "_m"),
+                    stats_root(stats_mean(runs, of_horizon(h, UAV_OF_SQUARE)))),
         verdict_add(verdict, name_at("cloud_std", second, "_m"), stats_mean(runs, of_horizon(h, UAV_OF_CLOUD))),
         verdict_add(verdict, coverage, stats_mean(runs, of_horizon(h, UAV_OF_COVERED))),
     };
@@ -68,7 +69,7 @@ static metric_t *add_gain(table_t runs, unsigned h, unsigned second, verdict_t *
 {
     const figure_t square = stats_ratio(runs, of_horizon(h, UAV_OF_IGNORED_SQUARE), of_horizon(h, UAV_OF_SQUARE));
 
-    return verdict_add(verdict, name_at("gain", second, ""), uav_root(square));
+    return verdict_add(verdict, name_at("gain", second, ""), stats_root(square));
 }
 
 static void add_reach(const uav_study_t *s, table_t runs, verdict_t *verdict)
@@ -107,9 +108,9 @@ static void judge_forecast(const uav_study_t *s, table_t runs, verdict_t *verdic
         const horizon_metrics_t m = add_horizon(runs, h, second, last ? "coverage" : name_at("coverage", second, ""),
                                                 forecast_page(s, second), verdict);
         if (last && s->as_page && !s->ekf && s->particles == 1000u && runs.n >= 200u) {
-            uav_accept(m.error, 0.0, 2.25);
-            uav_accept(m.cloud, 1.43, 1.49);
-            uav_accept(m.coverage, 0.92, 0.98);
+            metric_accept(m.error, 0.0, 2.25);
+            metric_accept(m.cloud, 1.43, 1.49);
+            metric_accept(m.coverage, 0.92, 0.98);
         }
     }
     add_reach(s, runs, verdict);
@@ -168,11 +169,11 @@ static void accept_unknown_wind(const uav_study_t *s, table_t runs, metric_t *wi
         return;
     }
     if (!s->wind_drawn && s->particles == 1000u) {
-        uav_accept(wind, 0.0, 0.20);
-        uav_accept(m->error, 0.0, 7.0);
-        uav_accept(m->coverage, 0.92, 1.0);
+        metric_accept(wind, 0.0, 0.20);
+        metric_accept(m->error, 0.0, 7.0);
+        metric_accept(m->coverage, 0.92, 1.0);
     } else if (s->wind_drawn && s->particles == 2000u) {
-        uav_accept(m->error, 0.0, 7.0);
+        metric_accept(m->error, 0.0, 7.0);
     }
 }
 
@@ -180,7 +181,7 @@ static void judge_unknown_wind(const uav_study_t *s, table_t runs, verdict_t *ve
 {
     const unknown_wind_t *page = unknown_wind_page(s);
     metric_t *wind = verdict_add(verdict, s->filter_seconds == 30u ? "wind_error_30s_mps" : "wind_error_mps",
-                                 uav_root(stats_mean(runs, UAV_WIND_SQUARE)));
+                                 stats_root(stats_mean(runs, UAV_WIND_SQUARE)));
 
     if (page != NULL) {
         wind->reference = known(page->wind_error);
@@ -234,9 +235,9 @@ static void judge_replay_horizon(const uav_study_t *s, table_t runs, unsigned h,
     /* The kernel is an alternative that the page puts level with the plain filter. */
     if (h > 0u && of_page && state && runs.n >= 60u && s->resampling && !s->distance &&
         (s->as_page || (s->kernel && uav_is_value(s->resample_below, 0.5)))) {
-        uav_accept(m.error, 0.0, bound[h]);
-        uav_accept(m.coverage, 0.90, 0.99);
-        uav_accept(gain, 3.0, (double)INFINITY);
+        metric_accept(m.error, 0.0, bound[h]);
+        metric_accept(m.coverage, 0.90, 0.99);
+        metric_accept(gain, 3.0, (double)INFINITY);
     }
 }
 
@@ -264,7 +265,7 @@ static void judge_replay(const uav_study_t *s, table_t runs, verdict_t *verdict)
         judge_replay_horizon(s, runs, h, verdict);
     }
     verdict_add(verdict, "coverage", pooled_coverage(runs));
-    verdict_add(verdict, "wind_error_mps", uav_root(stats_mean(runs, UAV_WIND_SQUARE)));
+    verdict_add(verdict, "wind_error_mps", stats_root(stats_mean(runs, UAV_WIND_SQUARE)));
     add_reach(s, runs, verdict);
     text_add(&verdict->notes,
              "A stand-in for the paper's flight log, which is not public. The wind's error is against its mean; the "

@@ -187,6 +187,19 @@ static uav_cloud_t look_at_cloud(const pfl_view_t *view, const double *truth)
     return cloud;
 }
 
+static void show(const model_t *model, const pfl_t *filter, const uav_track_t *track, unsigned k, const float *mean)
+{
+    const look_at_t at = {
+        .t_s = (double)k,
+        .state = {PFL_AUTOPILOT_X, PFL_AUTOPILOT_Y},
+        .axis = {"x [m]", "y [m]"},
+        .truth = {track->truth[k][PFL_AUTOPILOT_X], track->truth[k][PFL_AUTOPILOT_Y]},
+        .estimate = {(double)mean[PFL_AUTOPILOT_X], (double)mean[PFL_AUTOPILOT_Y]},
+    };
+
+    look_take(model->clouds->look, filter, &at);
+}
+
 static bool look(const model_t *model, pfl_t *filter, const uav_track_t *track, unsigned k, uav_flight_t *flight,
                  failure_t *failure)
 {
@@ -200,6 +213,7 @@ static bool look(const model_t *model, pfl_t *filter, const uav_track_t *track, 
     }
     to_belief(model, mean, cov, &flight->at[k]);
     flight->cloud[k] = look_at_cloud(&view, track->truth[k]);
+    show(model, filter, track, k, mean);
     if (k % CLOUD_EVERY_S == 0u || k % CLOUD_EVERY_S == CLOUD_EVERY_S - 1u) {
         cloud_take(model->clouds->text, model->clouds->filtered, (double)k, filter, PFL_AUTOPILOT_X, PFL_AUTOPILOT_Y);
     }
@@ -301,7 +315,6 @@ static bool look_ahead_where_due(const model_t *model, const pfl_t *filter, void
 static bool cycle(const uav_study_t *s, pfl_t *filter, const uav_track_t *track, unsigned k, uav_flight_t *flight,
                   failure_t *failure)
 {
-    const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
     const uint64_t t_us = (uint64_t)k * UAV_PERIOD_US;
     const pfl_autopilot_input_t wanted = uav_reference(s, k - 1u);
     const pfl_proposal_input_t with_fix = {&wanted, uav_has_fix(s, k) ? track->z[k] : NULL};
@@ -313,7 +326,7 @@ static bool cycle(const uav_study_t *s, pfl_t *filter, const uav_track_t *track,
         !check(pfl_health(filter, &health), "pfl_health", k, failure)) {
         return false;
     }
-    flight->cycles_ns[k - 1u] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
+    flight->cycles_ns[k - 1u] = cycle_ns(health.cycles_last);
     flight->cycle[k - 1u] = cycle_of(&health);
     flight->resampled = health.resampled;
     return true;

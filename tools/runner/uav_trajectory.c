@@ -63,8 +63,8 @@ static bool has_ignorant_twin(const uav_study_t *s)
 /* The twins first: the flight's own clouds then lie over theirs. */
 static bool fly_twins(const uav_study_t *s, uint32_t stream, text_t *cloud, flights_t *all, failure_t *failure)
 {
-    const uav_clouds_t of_unresampled = {cloud, "unresampled", "unresampled-ahead"};
-    const uav_clouds_t of_ignored = {cloud, "ignored", "ignored-ahead"};
+    const uav_clouds_t of_unresampled = {cloud, NULL, "unresampled", "unresampled-ahead"};
+    const uav_clouds_t of_ignored = {cloud, NULL, "ignored", "ignored-ahead"};
     uav_study_t twin = *s;
 
     if (has_unresampled_twin(s)) {
@@ -78,9 +78,10 @@ static bool fly_twins(const uav_study_t *s, uint32_t stream, text_t *cloud, flig
     return true;
 }
 
-static bool fly_all(const uav_study_t *s, uint32_t stream, text_t *cloud, flights_t *all, failure_t *failure)
+static bool fly_all(const uav_study_t *s, uint32_t stream, text_t *cloud, look_t *look, flights_t *all,
+                    failure_t *failure)
 {
-    const uav_clouds_t clouds = {cloud, "filter", "ahead"};
+    const uav_clouds_t clouds = {cloud, look, "filter", "ahead"};
 
     memset(all, 0, sizeof *all);
     uav_make_track(s, stream, &all->track);
@@ -155,7 +156,7 @@ static bool fly_one(const uav_study_t *s, uint32_t stream, bool first, double *v
     if (all == NULL) {
         return fail(failure, EXIT_HARNESS, "out of memory");
     }
-    const bool flown = fly_all(s, stream, first ? out->cloud : NULL, all, failure);
+    const bool flown = fly_all(s, stream, first ? out->cloud : NULL, first ? out->look : NULL, all, failure);
     if (flown) {
         score(s, all, value);
         out->hash = hash_flight(s, &all->flight, out->hash);

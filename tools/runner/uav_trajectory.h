@@ -103,6 +103,7 @@ typedef struct {
 /* Where clouds of particles go, and under which names; null for none. */
 typedef struct {
     text_t *text;
+    look_t *look;         /* each step of the filter, for look_take */
     const char *filtered; /* the filter's */
     const char *forecast; /* and those ahead of it */
 } uav_clouds_t;

@@ -130,9 +130,21 @@ static bool check(pfl_status_t status, const char *call, size_t i, failure_t *fa
     return status >= 0 || fail(failure, EXIT_HARNESS, "range %zu: %s: %s", i, call, pfl_status_string(status));
 }
 
+void uwb_show(const uwb_range_t *range, const float *mean, const pfl_t *filter, look_t *look)
+{
+    const look_at_t at = {
+        .t_s = range->t_s,
+        .state = {0u, 1u},
+        .axis = {"x [m]", "y [m]"},
+        .truth = {range->truth_x_m, range->truth_y_m},
+        .estimate = {(double)mean[0], (double)mean[1]},
+    };
+
+    look_take(look, filter, &at);
+}
+
 static bool fly(const uwb_study_t *s, pfl_t *filter, float *estimate, run_output_t *out, failure_t *failure)
 {
-    const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
     pfl_health_t health;
 
     for (size_t i = 0u; i < s->ranges; i++) {
@@ -149,8 +161,9 @@ static bool fly(const uwb_study_t *s, pfl_t *filter, float *estimate, run_output
         }
         estimate[2u * i] = mean[0];
         estimate[2u * i + 1u] = mean[1];
-        out->cycles_ns[i] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
+        out->cycles_ns[i] = cycle_ns(health.cycles_last);
         out->cycle[i] = cycle_of(&health);
+        uwb_show(range, mean, filter, out->look);
     }
     return true;
 }

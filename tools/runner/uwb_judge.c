@@ -20,16 +20,6 @@ static double bound_of(const uwb_study_t *s)
     return s->los ? 0.75 : 0.88;
 }
 
-static double worst(table_t runs, size_t column)
-{
-    double largest = 0.0;
-
-    for (size_t r = 0u; r < runs.n; r++) {
-        largest = fmax(largest, runs.table[r * runs.width + column]);
-    }
-    return largest;
-}
-
 void uwb_judge(const plan_t *plan, table_t runs, verdict_t *verdict)
 {
     const uwb_study_t *s = plan->own;
@@ -42,18 +32,15 @@ void uwb_judge(const plan_t *plan, table_t runs, verdict_t *verdict)
     verdict_add(verdict, "resampled_share", stats_mean(runs, UWB_RESAMPLED));
     if (runs.n > 1u) {
         metric_t *median = verdict_add(verdict, "rmse_m_median", stats_median(runs, UWB_RMSE));
-        metric_t *most = verdict_add(verdict, "rmse_m_worst", (figure_t){worst(runs, UWB_RMSE), (double)NAN});
+        metric_t *most = verdict_add(verdict, "rmse_m_worst", stats_largest(runs, UWB_RMSE));
         if (judged) {
-            most->lo = 0.0;
-            most->hi = WORST_SHARE * bound;
+            metric_accept(most, 0.0, WORST_SHARE * bound);
         }
         if (judged && runs.n >= SEEDS_FOR_MEDIAN) {
-            median->lo = 0.0;
-            median->hi = bound;
+            metric_accept(median, 0.0, bound);
         }
     } else if (judged) {
-        rmse->lo = 0.0;
-        rmse->hi = WORST_SHARE * bound;
+        metric_accept(rmse, 0.0, WORST_SHARE * bound);
     }
     text_add(&verdict->notes, s->indoor ? "One error a range, after the first 60; the start is anywhere in the square, "
                                           "with any heading.\n"

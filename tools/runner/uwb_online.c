@@ -111,7 +111,6 @@ static bool cycle(model_t *model, pfl_t *filter, const input_t *input, const pfl
 static bool fly(const uwb_study_t *s, model_t *model, pfl_t *filter, float *estimate, run_output_t *out,
                 failure_t *failure)
 {
-    const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
     pfl_range_bias_z_t z[2];
     const pfl_range_bias_z_t *fused = NULL;
     uint64_t before_us = 0u;
@@ -138,8 +137,9 @@ static bool fly(const uwb_study_t *s, model_t *model, pfl_t *filter, float *esti
         before_us = t_us;
         estimate[2u * i] = mean[0];
         estimate[2u * i + 1u] = mean[1];
-        out->cycles_ns[i] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
+        out->cycles_ns[i] = cycle_ns(health.cycles_last);
         out->cycle[i] = cycle_of(&health);
+        uwb_show(range, mean, filter, out->look);
     }
     return true;
 }

@@ -58,14 +58,6 @@ static void close_study(plan_t *plan)
     free(s);
 }
 
-static int compare_doubles(const void *a, const void *b)
-{
-    const double x = *(const double *)a;
-    const double y = *(const double *)b;
-
-    return (x > y) - (x < y);
-}
-
 /* Scores the estimates, horizontally, one error a range. */
 static bool score(const uwb_study_t *s, const float *estimate, run_output_t *out, failure_t *failure)
 {
@@ -95,7 +87,7 @@ static bool score(const uwb_study_t *s, const float *estimate, run_output_t *out
         free(error);
         return fail(failure, EXIT_HARNESS, "only %zu ranges: expected more than %zu", s->ranges, skipped);
     }
-    qsort(error, scored, sizeof *error, compare_doubles);
+    stats_sort(error, scored);
     out->value[UWB_RMSE] = sqrt(squares / (double)scored);
     out->value[UWB_P95] = error[(size_t)(0.95 * (double)(scored - 1u))];
     out->value[UWB_MAX] = error[scored - 1u];

@@ -55,6 +55,9 @@ bool uwb_online(const uwb_study_t *s, uint32_t run, float *estimate, run_output_
 void uwb_draw_ring(const uwb_study_t *s, float bias_m, const pfl_batch_t *p);
 void uwb_draw_box(const uwb_study_t *s, const pfl_batch_t *p);
 
+/* A step of either filter, to be looked at. */
+void uwb_show(const uwb_range_t *range, const float *mean, const pfl_t *filter, look_t *look);
+
 /* Metrics of the runs' rmse, p95, max and resampled share. */
 enum { UWB_RMSE, UWB_P95, UWB_MAX, UWB_RESAMPLED, UWB_VALUES };
 void uwb_judge(const plan_t *plan, table_t runs, verdict_t *verdict);

@@ -81,6 +81,22 @@ static void note(const wind_filter_t *f, size_t i, run_output_t *out)
     out->hash = hash_floats(out->hash, mean, PFL_WIND_STATES);
 }
 
+/* The wind: the covariance that all particles share is no part of their spread. A recording has no true wind. */
+static void show(const wind_filter_t *f, size_t i, look_t *look)
+{
+    const double variance = (double)f->wind.cov[PFL_WIND_WW];
+    const look_at_t at = {
+        .t_s = f->study->epoch[i].t_s,
+        .state = {PFL_WIND_Y_WIND, PFL_WIND_X_WIND},
+        .axis = {"wind to east [m/s]", "wind to north [m/s]"},
+        .truth = {MISSING, MISSING},
+        .estimate = {(double)f->mean[PFL_WIND_Y_WIND], (double)f->mean[PFL_WIND_X_WIND]},
+        .variance = {variance, variance},
+    };
+
+    look_take(look, f->filter, &at);
+}
+
 typedef struct {
     double squares, scale, settled;
     double next_outage_s, next_ahead_s;
@@ -132,7 +148,6 @@ static void conclude(const score_t *score, const wind_ahead_t *ahead, double *va
 static bool run_once(const plan_t *plan, uint32_t run, run_output_t *out, failure_t *failure)
 {
     const wind_study_t *s = plan->own;
-    const double ns_per_cycle = 1e9 / (double)pfl_port_cycles_hz();
     const double first_s = s->epoch[0].t_s + WIND_SETTLING_S;
     score_t score = {.next_outage_s = first_s, .next_ahead_s = first_s};
     wind_ahead_t ahead = {.starts = 0.0};
@@ -146,9 +161,10 @@ static bool run_once(const plan_t *plan, uint32_t run, run_output_t *out, failur
         pfl_health_t health = {0};
         done = wind_filter_cycle(&f, i, failure) && pfl_health(f.filter, &health) == PFL_OK;
         if (done) {
-            out->cycles_ns[i] = (uint32_t)((double)health.cycles_last * ns_per_cycle);
+            out->cycles_ns[i] = cycle_ns(health.cycles_last);
             out->cycle[i] = cycle_of(&health);
             note(&f, i, out);
+            show(&f, i, out->look);
             done = score_fix(&f, i, &score, &ahead, failure);
         }
     }
