@@ -321,100 +321,102 @@ static bool restart(const replay_study_t *s, setup_t *u, pfl_t *filter, size_t i
     }
     make_model(s, i, &u->model, &u->config);
     return check(pfl_reset(filter, s->event[i].t_us), "pfl_reset", i, failure);
-    static void show(const replay_event_t *e, const float *mean, const pfl_t *filter, look_t *look)
-    {
-        const look_at_t at = {
-            .t_s = e->t_s,
-            .state = {0u, 1u},
-            .axis = {"x [m]", "y [m]"},
-            .truth = {e->truth[0], e->truth[1]},
-            .estimate = {(double)mean[0], (double)mean[1]},
-        };
+}
 
-        look_take(look, filter, &at);
+static void show(const replay_event_t *e, const float *mean, const pfl_t *filter, look_t *look)
+{
+    const look_at_t at = {
+        .t_s = e->t_s,
+        .state = {0u, 1u},
+        .axis = {"x [m]", "y [m]"},
+        .truth = {e->truth[0], e->truth[1]},
+        .estimate = {(double)mean[0], (double)mean[1]},
+    };
+
+    look_take(look, filter, &at);
+}
+
+static bool cycle(const replay_study_t *s, const setup_t *u, pfl_t *filter, size_t i, run_output_t *out, sums_t *sums,
+                  failure_t *failure)
+{
+    const replay_event_t *e = &s->event[i];
+    const uint32_t states = u->model.states;
+    double row[REPLAY_COLUMNS];
+    float mean[REPLAY_STATES_MAX];
+    float cov[REPLAY_STATES_MAX * REPLAY_STATES_MAX];
+    pfl_health_t health;
+
+    for (size_t c = 0u; c < REPLAY_COLUMNS; c++) {
+        row[c] = MISSING;
     }
-
-    static bool cycle(const replay_study_t *s, const setup_t *u, pfl_t *filter, size_t i, run_output_t *out,
-                      sums_t *sums, failure_t *failure)
-    {
-        const replay_event_t *e = &s->event[i];
-        const uint32_t states = u->model.states;
-        double row[REPLAY_COLUMNS];
-        float mean[REPLAY_STATES_MAX];
-        float cov[REPLAY_STATES_MAX * REPLAY_STATES_MAX];
-        pfl_health_t health;
-
-        for (size_t c = 0u; c < REPLAY_COLUMNS; c++) {
-            row[c] = MISSING;
-        }
-        if (!check(pfl_predict(filter, e->t_us, &e->odometry), "pfl_predict", i, failure)) {
+    if (!check(pfl_predict(filter, e->t_us, &e->odometry), "pfl_predict", i, failure)) {
+        return false;
+    }
+    if (replay_is_position(e->sensor)) {
+        if (!check(pfl_estimate(filter, mean, cov), "pfl_estimate", i, failure)) {
             return false;
         }
-        if (replay_is_position(e->sensor)) {
-            if (!check(pfl_estimate(filter, mean, cov), "pfl_estimate", i, failure)) {
-                return false;
-            }
-            score_innovation(s, e, mean, cov, states, row, sums);
-        }
-        const void *z = e->sensor == REPLAY_RANGE ? (const void *)&e->range : e->z;
-        if (!check(pfl_update(filter, u->number[e->sensor], e->t_us, z), "pfl_update", i, failure) ||
-            !check(pfl_estimate(filter, mean, cov), "pfl_estimate", i, failure) ||
-            !check(pfl_health(filter, &health), "pfl_health", i, failure)) {
+        score_innovation(s, e, mean, cov, states, row, sums);
+    }
+    const void *z = e->sensor == REPLAY_RANGE ? (const void *)&e->range : e->z;
+    if (!check(pfl_update(filter, u->number[e->sensor], e->t_us, z), "pfl_update", i, failure) ||
+        !check(pfl_estimate(filter, mean, cov), "pfl_estimate", i, failure) ||
+        !check(pfl_health(filter, &health), "pfl_health", i, failure)) {
+        return false;
+    }
+    score_estimate(s, e, mean, cov, states, row, sums);
+    sums->ess += (double)health.ess;
+    out->hash = hash_floats(out->hash, mean, states);
+    out->cycles_ns[i] = cycle_ns(health.cycles_last);
+    out->cycle[i] = cycle_of(&health);
+    show(e, mean, filter, out->look);
+    out->value[REPLAY_REJECTED] = (double)health.rejected;
+    out->value[REPLAY_RESTARTS] = (double)health.resets;
+    if (out->series != NULL) {
+        memcpy(&out->series[i * REPLAY_COLUMNS], row, sizeof row);
+    }
+    return true;
+}
+
+static bool fly(const replay_study_t *s, setup_t *u, pfl_t *filter, run_output_t *out, failure_t *failure)
+{
+    sums_t sums = {0};
+
+    for (size_t i = 0u; i < s->events; i++) {
+        if (!restart(s, u, filter, i, failure) || !cycle(s, u, filter, i, out, &sums, failure)) {
             return false;
         }
-        score_estimate(s, e, mean, cov, states, row, sums);
-        sums->ess += (double)health.ess;
-        out->hash = hash_floats(out->hash, mean, states);
-        out->cycles_ns[i] = cycle_ns(health.cycles_last);
-        out->cycle[i] = cycle_of(&health);
-        show(e, mean, filter, out->look);
-        out->value[REPLAY_REJECTED] = (double)health.rejected;
-        out->value[REPLAY_RESTARTS] = (double)health.resets;
-        if (out->series != NULL) {
-            memcpy(&out->series[i * REPLAY_COLUMNS], row, sizeof row);
-        }
-        return true;
     }
-
-    static bool fly(const replay_study_t *s, setup_t *u, pfl_t *filter, run_output_t *out, failure_t *failure)
-    {
-        sums_t sums = {0};
-
-        for (size_t i = 0u; i < s->events; i++) {
-            if (!restart(s, u, filter, i, failure) || !cycle(s, u, filter, i, out, &sums, failure)) {
-                return false;
-            }
-        }
-        if (sums.positions == 0u && sums.compared == 0u) {
-            return fail(failure, EXIT_USAGE, "--set from=%g: the log has no position after that, measured or true",
-                        s->from_s);
-        }
-        const double positions = (double)sums.positions;
-        out->value[REPLAY_INNOVATION] = sums.positions > 0u ? sqrt(sums.innovation / positions) : MISSING;
-        out->value[REPLAY_NIS] = sums.positions > 0u ? sums.nis / positions : MISSING;
-        out->value[REPLAY_INSIDE] = sums.positions > 0u ? (double)sums.inside / positions : MISSING;
-        out->value[REPLAY_SCORED] = positions;
-        out->value[REPLAY_ERROR] = sums.compared > 0u ? sqrt(sums.error / (double)sums.compared) : MISSING;
-        out->value[REPLAY_NEES] = sums.compared > 0u ? sums.nees / (double)sums.compared : MISSING;
-        out->value[REPLAY_RESAMPLED] = (double)out->cycle[s->events - 1u].resampled / (double)s->events;
-        out->value[REPLAY_ESS] = sums.ess / ((double)s->events * (double)s->particles);
-        out->value[REPLAY_ARENA] = (double)pfl_arena_bytes(&u->config);
-        return true;
+    if (sums.positions == 0u && sums.compared == 0u) {
+        return fail(failure, EXIT_USAGE, "--set from=%g: the log has no position after that, measured or true",
+                    s->from_s);
     }
+    const double positions = (double)sums.positions;
+    out->value[REPLAY_INNOVATION] = sums.positions > 0u ? sqrt(sums.innovation / positions) : MISSING;
+    out->value[REPLAY_NIS] = sums.positions > 0u ? sums.nis / positions : MISSING;
+    out->value[REPLAY_INSIDE] = sums.positions > 0u ? (double)sums.inside / positions : MISSING;
+    out->value[REPLAY_SCORED] = positions;
+    out->value[REPLAY_ERROR] = sums.compared > 0u ? sqrt(sums.error / (double)sums.compared) : MISSING;
+    out->value[REPLAY_NEES] = sums.compared > 0u ? sums.nees / (double)sums.compared : MISSING;
+    out->value[REPLAY_RESAMPLED] = (double)out->cycle[s->events - 1u].resampled / (double)s->events;
+    out->value[REPLAY_ESS] = sums.ess / ((double)s->events * (double)s->particles);
+    out->value[REPLAY_ARENA] = (double)pfl_arena_bytes(&u->config);
+    return true;
+}
 
-    bool replay_fly(const replay_study_t *s, uint32_t run, run_output_t *out, failure_t *failure)
-    {
-        setup_t u;
-        pfl_t *filter;
+bool replay_fly(const replay_study_t *s, uint32_t run, run_output_t *out, failure_t *failure)
+{
+    setup_t u;
+    pfl_t *filter;
 
-        make_setup(s, run, &u);
-        const size_t bytes = pfl_arena_bytes(&u.config);
-        void *arena = malloc(bytes + 1u);
-        if (arena == NULL) {
-            return fail(failure, EXIT_HARNESS, "no memory for %lu particles", (unsigned long)s->particles);
-        }
-        const bool flown = check(pfl_init(arena, bytes, &u.config, 0u, &filter), "pfl_init", 0u, failure) &&
-                           fly(s, &u, filter, out, failure);
-        free(arena);
-        return flown;
+    make_setup(s, run, &u);
+    const size_t bytes = pfl_arena_bytes(&u.config);
+    void *arena = malloc(bytes + 1u);
+    if (arena == NULL) {
+        return fail(failure, EXIT_HARNESS, "no memory for %lu particles", (unsigned long)s->particles);
     }
+    const bool flown = check(pfl_init(arena, bytes, &u.config, 0u, &filter), "pfl_init", 0u, failure) &&
+                       fly(s, &u, filter, out, failure);
+    free(arena);
+    return flown;
+}
