@@ -8,13 +8,12 @@ import subprocess
 
 import flight
 import machines
+import whole
 from machines import ROOT
 
 OUT = ROOT / "build/target/bits"
 GOLDEN = ROOT / "test/bits/golden.txt"
 PROGRAM = ["bits_main.c", "bits_modules.c", "flights.c"]
-BOARD = {"FLASH": "0", "FLASH_BYTES": "0x400000", "RAM": "0x21000000", "RAM_BYTES": "0x1000000", "STACK_BYTES": "0x8000"}
-LARGE_M4F = ["qemu-system-arm", "-M", "mps2-an386", *machines.SEMIHOSTING, "-kernel"]
 NAMES = ["cortex-m4f"] + [machine.name for machine in machines.ALL if machine.emulator and not machine.system]
 
 
@@ -29,23 +28,18 @@ def sources_and_flags():
 
 
 def built(machine):
-    """Linux machines: a static program. The Cortex-M4F: an image with newlib, as the unit tests there have it."""
+    """The program: on the Cortex-M4F an image with newlib (whole/), on Linux machines a static one."""
+    if machine.system:
+        return whole.image("whole_bits")
     flight.need(machine.prefix + "gcc")
     flight.need(machine.emulator[0])
     OUT.mkdir(parents=True, exist_ok=True)
     image = OUT / machine.name
     sources, flags = sources_and_flags()
     sources += [str(ROOT / "port/null/port_null.c"), *(str(ROOT / "test/bits" / name) for name in PROGRAM)]
-    command = [machine.prefix + "gcc", "-std=c99", "-O3", *flags, "-I", str(ROOT / "lib/include")]
-    if machine.system:
-        board = ROOT / "tools/targets/board"
-        sources += [str(ROOT / "test/target/syscalls.c"), str(board / "startup_cortex_m.c")]
-        command += ["-mcpu=cortex-m4", "-mthumb", "-mfpu=fpv4-sp-d16", "-mfloat-abi=hard", "-nostartfiles", "-T",
-                    str(board / "cortex_m.ld"), "-Wl,--gc-sections,--no-warn-rwx-segments",
-                    *(f"-Wl,--defsym=BOARD_{name}={value}" for name, value in BOARD.items())]
-    else:
-        command += ["-static", *(["-fexcess-precision=fast"] if machine.name == "s390x" else [])]
-    flight.checked([*command, *sources, "-o", str(image)], OUT / f"{machine.name}.log")
+    flags += ["-fexcess-precision=fast"] if machine.name == "s390x" else []
+    flight.checked([machine.prefix + "gcc", "-std=c99", "-O3", *flags, "-static", "-I", str(ROOT / "lib/include"), *sources, "-o",
+                    str(image)], OUT / f"{machine.name}.log")
     return image
 
 
@@ -53,13 +47,13 @@ def compare(name):
     """True when the machine prints golden.txt; the lines that differ otherwise."""
     machine = machines.find(name)
     image = built(machine)
-    command = [*LARGE_M4F, str(image)] if machine.system else machine.command(image)
+    command = (machines.LARGE_M4F if machine.system else machine).command(image)
     done = subprocess.run(["timeout", str(flight.RUN_SECONDS), *command], capture_output=True, text=True, stdin=subprocess.DEVNULL,
                           check=False)
     if done.returncode != 0:
         raise flight.Failure(f"{name}: the program ended with {done.returncode}: {(done.stdout + done.stderr).strip()[-200:]}")
     golden = GOLDEN.read_text().splitlines()
-    difference = [line for line in difflib.unified_diff(golden, done.stdout.splitlines(), "golden.txt", name, lineterm="", n=0)]
+    difference = list(difflib.unified_diff(golden, done.stdout.splitlines(), "golden.txt", name, lineterm="", n=0))
     if difference:
         print("\n".join(difference))
     print(f"{name}: {'NOT ' if difference else ''}the {len(golden)} lines of test/bits/golden.txt")

@@ -68,3 +68,8 @@ def runs_here(machine):
 
 def find(name):
     return next(machine for machine in ALL if machine.name == name)
+
+
+# The Cortex-M4F again, on Arm's MPS2 board with 16 MB of RAM: whole programs with a C library (tools/targets/whole).
+LARGE_M4F = Machine("cortex-m4f-large", "Cortex-M4F, MPS2 AN386 with external RAM, bare metal",
+                    ("qemu-system-arm", "-M", "mps2-an386"), "arm-none-eabi-")
