@@ -108,20 +108,21 @@ def read_cycles(log):
     return filters[1:]
 
 
-def chosen(scenario, filters, wanted):
-    """The cycles to count, with an update each: of one of the filters that the scenario flies in turn, or of all."""
+def name_of_filter(scenario, wanted):
+    """Which of the filters that a scenario flies in turn is counted: the last unless said; None where it flies one."""
     names = FILTERS.get(scenario)
-    if names is None:
-        if wanted:
-            raise flight.Failure(f"{scenario} flies one filter: --part is for {', '.join(FILTERS)}", 2)
-        cycles, at, name = [cycle for each in filters for cycle in each], 0, None
-    else:
-        name = wanted or names[-1]
-        if name not in names:
-            raise flight.Failure(f"--part '{wanted}': {scenario} flies {', '.join(names)}", 2)
-        at = names.index(name)
-        cycles = filters[at]
-    return [cycle for cycle in cycles if cycle["updates"]], at, name
+    if names is None and wanted:
+        raise flight.Failure(f"{scenario} flies one filter; --part is for {', '.join(FILTERS)}", 2)
+    if names is not None and wanted and wanted not in names:
+        raise flight.Failure(f"{scenario} flies no filter '{wanted}' but {', '.join(names)}", 2)
+    return wanted or (names and names[-1])
+
+
+def chosen(scenario, filters, name):
+    """The cycles to count, with an update each, and the number of their filter among all of the run."""
+    at = FILTERS[scenario].index(name) if name else 0
+    cycles = filters[at] if name else [cycle for each in filters for cycle in each]
+    return [cycle for cycle in cycles if cycle["updates"]], at
 
 
 # ---- The flight ---------------------------------------------------------------------------------------------------------------
@@ -152,8 +153,10 @@ def fly(scenario, machine, options):
 
 
 def fly_whole(scenario, options):
-    if options.steps or options.ess_ratio is not None or options.sharpen is not None or options.noise != "own" or options.optimise != "O3":
+    for_tapes = (options.steps, options.ess_ratio, options.sharpen) != (None, None, None)
+    if for_tapes or options.noise != "own" or options.optimise != "O3":
         raise flight.Failure(f"{scenario} flies as a whole here: --steps, --ess-ratio, --sharpen, --noise and --optimise are for tapes", 2)
+    name = name_of_filter(scenario, getattr(options, "part", None))
     folder = flight.BUILD / "flights" / LARGE_M4F.name / scenario
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
@@ -162,8 +165,8 @@ def fly_whole(scenario, options):
     pairs = fly_there(words, folder)
     filters = [tuple(map(int, value.split(":"))) for key, value in pairs if key == "filter"]
     line = dict(pairs)
-    cycles, at, name = chosen(scenario, read_cycles(folder / "calls.txt"), getattr(options, "part", None))
-    if not cycles or not filters:
+    cycles, at = chosen(scenario, read_cycles(folder / "calls.txt"), name)
+    if not cycles:
         raise flight.Failure(f"{scenario} makes no update with these settings: choose a particle filter, --filter", 2)
     particles, arena = filters[at]
     return {
