@@ -1,7 +1,7 @@
 """The golden hashes of test/bits on another machine: all that the library computes, every module, against golden.txt.
 
-The program needs 17 MB, as its inputs are a million numbers each: the Cortex-M4F is Arm's MPS2 board (AN386) with its
-external RAM, not the STM32F405 that flights are counted on."""
+The program needs 17 MB, as its inputs are a million numbers each: the Cortex-M are boards with external RAM (machines.LARGE),
+not those that flights are counted on."""
 import difflib
 import re
 import subprocess
@@ -14,7 +14,7 @@ from machines import ROOT
 OUT = ROOT / "build/target/bits"
 GOLDEN = ROOT / "test/bits/golden.txt"
 PROGRAM = ["bits_main.c", "bits_modules.c", "flights.c"]
-NAMES = ["cortex-m4f"] + [machine.name for machine in machines.ALL if machine.emulator and not machine.system]
+NAMES = [*machines.LARGE, *(machine.name for machine in machines.ALL if machine.emulator and not machine.system)]
 
 
 def sources_and_flags():
@@ -28,9 +28,9 @@ def sources_and_flags():
 
 
 def built(machine):
-    """The program: on the Cortex-M4F an image with newlib (whole/), on Linux machines a static one."""
+    """The program: on the Cortex-M an image with newlib (whole/), on Linux machines a static one."""
     if machine.system:
-        return whole.image("whole_bits")
+        return whole.image(machines.LARGE[machine.name], "whole_bits")
     flight.need(machine.prefix + "gcc")
     flight.need(machine.emulator[0])
     OUT.mkdir(parents=True, exist_ok=True)
@@ -47,7 +47,7 @@ def compare(name):
     """True when the machine prints golden.txt; the lines that differ otherwise."""
     machine = machines.find(name)
     image = built(machine)
-    command = (machines.LARGE_M4F if machine.system else machine).command(image)
+    command = machines.LARGE.get(name, machine).command(image)
     done = subprocess.run(["timeout", str(flight.RUN_SECONDS), *command], capture_output=True, text=True, stdin=subprocess.DEVNULL,
                           check=False)
     if done.returncode != 0:

@@ -1,8 +1,8 @@
-"""One run of a scenario, all of it on an emulated Cortex-M4F: for scenarios whose callbacks and structures no tape holds.
+"""One run of a scenario, all of it on an emulated Cortex-M4F, M7 or M55: for scenarios whose callbacks and structures no tape holds.
 
 The image is the scenario runner itself with newlib (whole/main.c): it reads the recordings, makes the truth, flies the
-filters and hashes their estimates, as tools/run does on the host. So the board is Arm's MPS2 (AN386) with 16 MB of external
-RAM, and what only fits there (the map of `terrain`, the recordings) says nothing about an STM32F405; the filter's arena is
+filters and hashes their estimates, as tools/run does on the host. So the board is one of Arm's with 16 MB of external RAM
+(machines.LARGE), and what only fits there (the map of `terrain`, the recordings) says nothing about an STM32F405; the filter's arena is
 told. Calls of the library are counted by the plugin, the scenario's own code is not."""
 import os
 import re
@@ -11,9 +11,8 @@ import subprocess
 
 import flight
 import machines
-from machines import LARGE_M4F, ROOT
+from machines import LARGE, ROOT
 
-BUILD = flight.BUILD / LARGE_M4F.name
 RUN_SECONDS = 600
 # Calls beside those of flight.CALLS, and the stage that they belong to.
 CALLS = flight.CALLS | {
@@ -30,16 +29,17 @@ FILTERS = {
 }
 
 
-def image(target):
+def image(board, target):
     """An image of whole/CMakeLists.txt: whole_run or whole_bits."""
     def make():
-        flight.need(LARGE_M4F.emulator[0])
-        flight.need(LARGE_M4F.prefix + "gcc")
-        flight.configure_and_build(BUILD, target, [
+        flight.need(board.emulator[0])
+        flight.need(board.prefix + "gcc")
+        folder = flight.BUILD / board.name
+        flight.configure_and_build(folder, target, [
             "-DPFLIGHT_BUILD_TOOLS=OFF", "-DPFLIGHT_BUILD_WHOLE=ON", "-DCMAKE_BUILD_TYPE=Release",
-            "-DCMAKE_TOOLCHAIN_FILE=tools/targets/toolchain/cortex-m4f-large.cmake"])
-        return BUILD / "tools/targets/whole" / target
-    return flight.build_once(target, make)
+            f"-DCMAKE_TOOLCHAIN_FILE=tools/targets/toolchain/{board.name}.cmake"])
+        return folder / "tools/targets/whole" / target
+    return flight.build_once((board.name, target), make)
 
 
 def host_runner():
@@ -51,21 +51,22 @@ def host_runner():
     return flight.build_once("host runner", make)
 
 
-def plug(program, log):
-    where = flight.addresses(LARGE_M4F, program)
+def plug(board, program, log):
+    where = flight.addresses(board, program)
     parts = [f"part={stage}@{where[name]}" for stage, name in flight.PARTS.items()]
     calls = [f"call={name}@{where[name]}" for name in CALLS if name in where]
     return ",".join([str(flight.plugin()), f"out={log}", f"from={where['main']}", *calls, *parts])
 
 
-def fly_there(arguments, folder):
+def fly_there(board, arguments, folder):
     """The run on the emulated board: its line as (key, value) pairs. The plugin's log is left in the folder."""
-    program = image("whole_run")
+    program = image(board, "whole_run")
     (folder / "arguments").write_text("".join(f"{word}\n" for word in arguments))
-    done = subprocess.run(["timeout", str(RUN_SECONDS), *LARGE_M4F.command(program, plug(program, folder / "calls.txt"))], cwd=folder,
-                          capture_output=True, text=True, stdin=subprocess.DEVNULL, check=False)
+    command = board.command(program, plug(board, program, folder / "calls.txt"))
+    done = subprocess.run(["timeout", str(RUN_SECONDS), *command], cwd=folder, capture_output=True, text=True,
+                          stdin=subprocess.DEVNULL, check=False)
     if done.returncode != 0:
-        raise flight.Failure(f"{LARGE_M4F.name}: {(done.stdout + done.stderr).strip() or done.returncode}")
+        raise flight.Failure(f"{board.name}: {(done.stdout + done.stderr).strip() or done.returncode}")
     return [tuple(pair.split("=")) for pair in done.stdout.split()]
 
 
@@ -140,29 +141,29 @@ def arguments_of(scenario, options):
 
 
 def fly(scenario, machine, options):
-    """From a tape where there is one, as the STM32F405 and all other machines can; else the whole run, on the Cortex-M4F."""
+    """From a tape where there is one, as the STM32F405 and all other machines can; else the whole run, where it can."""
     if not getattr(options, "whole", False) and not getattr(options, "part", None):
         try:
             return flight.fly(scenario, machine, options)
         except flight.NoTape as reason:
-            if machine.name != "cortex-m4f":
-                raise flight.Failure(f"{reason}; such a run flies on cortex-m4f only", 2) from None
-    if machine.name != "cortex-m4f":
-        raise flight.Failure("--whole and --part are for --target cortex-m4f", 2)
-    return fly_whole(scenario, options)
+            if machine.name not in LARGE:
+                raise flight.Failure(f"{reason}; such a run flies on {', '.join(LARGE)} only", 2) from None
+    if machine.name not in LARGE:
+        raise flight.Failure(f"--whole and --part are for --target {', '.join(LARGE)}", 2)
+    return fly_whole(scenario, LARGE[machine.name], options)
 
 
-def fly_whole(scenario, options):
+def fly_whole(scenario, board, options):
     for_tapes = (options.steps, options.ess_ratio, options.sharpen) != (None, None, None)
     if for_tapes or options.noise != "own" or options.optimise != "O3":
         raise flight.Failure(f"{scenario} flies as a whole here: --steps, --ess-ratio, --sharpen, --noise and --optimise are for tapes", 2)
     name = name_of_filter(scenario, getattr(options, "part", None))
-    folder = flight.BUILD / "flights" / LARGE_M4F.name / scenario
+    folder = flight.BUILD / "flights" / board.name / scenario
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
     words = arguments_of(scenario, options)
     _, said = flight.runner([str(host_runner()), *words, "--json", "-"], folder)
-    pairs = fly_there(words, folder)
+    pairs = fly_there(board, words, folder)
     filters = [tuple(map(int, value.split(":"))) for key, value in pairs if key == "filter"]
     line = dict(pairs)
     cycles, at = chosen(scenario, read_cycles(folder / "calls.txt"), name)
@@ -170,7 +171,7 @@ def fly_whole(scenario, options):
         raise flight.Failure(f"{scenario} makes no update with these settings: choose a particle filter, --filter", 2)
     particles, arena = filters[at]
     return {
-        "schema": 1, "scenario": scenario, "target": LARGE_M4F.name, "compiler": flight.compiler_of(LARGE_M4F), "optimisation": "-O3",
+        "schema": 1, "scenario": scenario, "target": board.name, "compiler": flight.compiler_of(board), "optimisation": "-O3",
         "particles": particles, "steps": len(cycles), "instructions_not_cycles": True, "arena_bytes": arena, "part": name,
         "whole": True, "hash": line["hash"], "host_hash": said["hash"], "same_bits": line["hash"] == said["hash"], "stack_bytes": {},
     } | flight.summarise(cycles, particles)
