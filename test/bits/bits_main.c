@@ -4,7 +4,6 @@
 
 #include "pflight/pflight.h"
 
-#include <inttypes.h>
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
@@ -33,7 +32,7 @@ void begin(uint64_t seed)
 
 void end(const char *part)
 {
-    printf("%-28s %016" PRIx64 "\n", part, hash);
+    printf("%-28s %08lx%08lx\n", part, (unsigned long)(hash >> 32), (unsigned long)(hash & 0xFFFFFFFFu));
 }
 
 static void mix_u32(uint32_t u)

@@ -12,11 +12,13 @@
 #define SPREAD_M 0.177f /* of a position in a step: dt^2/2 accel / sqrt(dt) */
 #define KICK_MPS 0.707f
 #define LONG_MOST 1000u /* particles of the adaptive filter at most */
+#define TURN_WALK 0.02f /* of the marginalised filter with a covariance for each particle */
 #define NOISES_MAX 3u
-#define STATES_MAX 6u
+#define STATES_MAX 8u
 
 enum { EXTRA = PFL_CV_STATES, FAVOUR };
-typedef enum { PLAIN, IN_STEPS, LOOKING, LOOKING_AND_GIVEN, GIVEN, COUNTING, JUMPING } way_t;
+enum { TURN = PFL_CV_STATES, COVARIANCE }; /* of that filter: its rate of turn, and the covariance of its velocity */
+typedef enum { PLAIN, IN_STEPS, LOOKING, LOOKING_AND_GIVEN, GIVEN, COUNTING, JUMPING, MARGINAL, MARGINAL_EACH } way_t;
 
 static union {
     uint64_t align;
@@ -64,6 +66,44 @@ static pfl_jump_t jump = {2u,
 static const pfl_kernel_t kernels[] = {
     {0.3f, 0u, pfl_kernel_move}, {0.2f, 0u, pfl_kernel_gaussian}, {0.2f, 0u, pfl_kernel_epanechnikov}};
 
+/* The velocity is linear once the position is known; position and velocity are moved by noises of their own. */
+#define VELOCITY_IS_LINEAR                                                                                             \
+    .linear = 2u, .mean = PFL_CV_VX, .driven = 2u, .state = {PFL_CV_X, PFL_CV_Y}, .noise = {0u, 1u},                   \
+    .drive = {{0.5f, 0.0f}, {0.0f, 0.5f}}, .drive_variance = {SPREAD_M * SPREAD_M, SPREAD_M * SPREAD_M},               \
+    .transition = {{1.0f, 0.0f}, {0.0f, 1.0f}}, .process_cov = {KICK_MPS * KICK_MPS, 0.0f, KICK_MPS * KICK_MPS}
+static const pfl_marginal_shared_t shared_at_start = {.model = {VELOCITY_IS_LINEAR}, .cov = {1.0f, 0.0f, 1.0f}};
+static pfl_marginal_shared_t shared;
+static float work[PFL_MARGINAL_WORK(2u, 2u)];
+
+static void walk_turn(void *user, const void *u, float dt_s, const pfl_batch_t *p)
+{
+    const float walk = TURN_WALK * pfl_sqrtf(dt_s);
+    (void)user;
+    (void)u;
+    for (uint32_t i = 0u; i < p->n; i++) {
+        PFL_STATE(p, TURN)[i] += walk * PFL_NOISE(p, 2)[i];
+    }
+}
+
+/* The velocity turns by what the particle believes: each has a matrix of its own. */
+static void turn_velocity(void *user, const void *u, float dt_s, const pfl_view_t *p, float *drive, float *transition)
+{
+    (void)user;
+    (void)u;
+    (void)drive;
+    for (uint32_t i = 0u; i < p->n; i++) {
+        const float angle = dt_s * p->x[(TURN * p->stride) + i];
+        const float cosine = 1.0f - (0.5f * (angle * angle));
+        transition[i] = cosine;
+        transition[PFL_MARGINAL_STRIP + i] = -angle;
+        transition[(2u * PFL_MARGINAL_STRIP) + i] = angle;
+        transition[(3u * PFL_MARGINAL_STRIP) + i] = cosine;
+    }
+}
+
+static pfl_marginal_each_t each = {
+    .model = {VELOCITY_IS_LINEAR, .predict = walk_turn}, .matrices = turn_velocity, .cov = COVARIANCE, .work = work};
+
 static void see_both(void *user, const void *z, const pfl_view_t *p, float *ll)
 {
     const float *measured = (const float *)z;
@@ -81,11 +121,12 @@ static void see_both(void *user, const void *z, const pfl_view_t *p, float *ll)
     }
 }
 
-static void draw(uint32_t states, const pfl_batch_t *p)
+/* drawn: states from normals; the others are 0. */
+static void draw(uint32_t states, uint32_t drawn, const pfl_batch_t *p)
 {
     for (uint32_t d = 0u; d < states; d++) {
         for (uint32_t i = 0u; i < p->n; i++) {
-            PFL_STATE(p, d)[i] = (d < PFL_CV_STATES) ? PFL_NOISE(p, d)[i] : 0.0f;
+            PFL_STATE(p, d)[i] = (d < drawn) ? PFL_NOISE(p, d)[i] : 0.0f;
         }
     }
 }
@@ -103,8 +144,9 @@ typedef struct {
     const pfl_kernel_t *kernel;
 } kind_t;
 
-const char *const flight_names[FLIGHTS] = {"bootstrap", "regularised", "epanechnikov", "tempered", "auxiliary",
-                                           "optimal",   "adapted",     "adaptive",     "jump",     "errors"};
+const char *const flight_names[FLIGHTS] = {"bootstrap", "regularised",     "epanechnikov", "tempered", "auxiliary",
+                                           "optimal",   "adapted",         "adaptive",     "jump",     "errors",
+                                           "liu-west",  "marginal-shared", "marginal-each"};
 
 static const kind_t kinds[FLIGHTS] = {
     {PLAIN, 4u, 2u, pfl_constant_velocity_predict, &moving, pfl_position_loglik, &seen, NULL},
@@ -117,6 +159,21 @@ static const kind_t kinds[FLIGHTS] = {
     {COUNTING, 4u, 2u, pfl_constant_velocity_predict, &moving, pfl_position_loglik, &seen, NULL},
     {JUMPING, 5u, 3u, pfl_jump_predict, &jump, pfl_position_loglik, &seen, NULL},
     {PLAIN, 5u, 3u, pfl_drift_predict, &drifting, see_both, &seen, NULL},
+    {PLAIN, 4u, 2u, pfl_constant_velocity_predict, &moving, pfl_position_loglik, &seen, &kernels[0]},
+    {MARGINAL, 4u, 2u, pfl_marginal_shared_predict, &shared, pfl_position_loglik, &seen, NULL},
+    {MARGINAL_EACH, 8u, 3u, pfl_marginal_each_predict, &each, pfl_position_loglik, &seen, NULL},
+};
+
+/* Structure and workspace of the module, by way_t. */
+static const uint32_t beside_bytes[] = {
+    [IN_STEPS] = sizeof tempered,
+    [LOOKING] = sizeof auxiliary,
+    [LOOKING_AND_GIVEN] = sizeof auxiliary + sizeof proposal,
+    [GIVEN] = sizeof proposal,
+    [COUNTING] = sizeof(pfl_adaptive_t) + sizeof bins,
+    [JUMPING] = sizeof jump + sizeof room,
+    [MARGINAL] = sizeof shared,
+    [MARGINAL_EACH] = sizeof each + sizeof work,
 };
 
 /* Everything that one flight is made of. */
@@ -136,9 +193,16 @@ static void moved(void *user, const void *u, float dt_s, const pfl_batch_t *p)
     kind->predict(kind->model, u, dt_s, p);
 }
 
+/* The marginalised filters carry the velocity's mean and covariance, the prior's at first. */
 static void drawn(void *user, const pfl_batch_t *p)
 {
-    draw(((const kind_t *)user)->states, p);
+    const kind_t *kind = (const kind_t *)user;
+    const bool marginal = (kind->way == MARGINAL) || (kind->way == MARGINAL_EACH);
+    draw(kind->states, marginal ? 2u : PFL_CV_STATES, p);
+    for (uint32_t i = 0u; (kind->way == MARGINAL_EACH) && (i < p->n); i++) {
+        PFL_STATE(p, COVARIANCE)[i] = 1.0f;
+        PFL_STATE(p, COVARIANCE + 2u)[i] = 1.0f;
+    }
 }
 
 static bool start(flight_t *w, uint32_t number, uint32_t budget_cycles)
@@ -162,6 +226,7 @@ static bool start(flight_t *w, uint32_t number, uint32_t budget_cycles)
     c->predict = moved;
     c->draw = drawn;
     c->user = (void *)(uintptr_t)w->kind;
+    shared = shared_at_start;
     pfl_rng_seed(&w->dice, 12u);
     if (w->kind->way != COUNTING) {
         return pfl_init(&arena, sizeof arena, c, 0u, &w->f) == PFL_OK;
@@ -202,8 +267,13 @@ static pfl_status_t cycle(flight_t *w, uint64_t t_us)
     const pfl_proposal_input_t blind = {NULL, NULL};
     const pfl_proposal_input_t given = {NULL, w->z};
     const bool looks = (way == LOOKING) || (way == LOOKING_AND_GIVEN);
+    const pfl_marginal_input_t unseen = {NULL, NULL}; /* nothing linear is measured */
+    const bool marginal = (way == MARGINAL) || (way == MARGINAL_EACH);
     pfl_status_t s = looks ? pfl_auxiliary_look(w->f, &auxiliary, t_us, &blind, w->z) : PFL_OK;
-    s = (s == PFL_OK) ? pfl_predict(w->f, t_us, &given) : s;
+    if (way == MARGINAL) {
+        pfl_marginal_shared_step(&shared, false);
+    }
+    s = (s == PFL_OK) ? pfl_predict(w->f, t_us, marginal ? (const void *)&unseen : (const void *)&given) : s;
     if (s == PFL_OK) {
         s = (way == IN_STEPS) ? pfl_tempered_update(w->f, 0u, t_us, w->z) : pfl_update(w->f, 0u, t_us, w->z);
     }
@@ -244,6 +314,10 @@ bool flight_fly(uint32_t number, uint32_t budget_cycles, flown_t *flown)
     if (!start(&w, number, budget_cycles)) {
         return false;
     }
+    pfl_config_t laid = w.adaptive.config; /* for the most, whatever it begins with */
+    laid.particles = (w.kind->way == COUNTING) ? LONG_MOST : laid.particles;
+    flown->arena_bytes = (uint32_t)pfl_arena_bytes(&laid);
+    flown->beside_bytes = beside_bytes[w.kind->way];
     for (uint32_t k = 1u; k <= FLIGHT_STEPS; k++) {
         move_truth(&w);
         flown->particles[k - 1u] = w.adaptive.config.particles;

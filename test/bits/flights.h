@@ -14,11 +14,13 @@ typedef struct {
     uint32_t cycles;         /* of the port's counter, all cycles */
     uint32_t cycles_max;
     uint32_t overruns;
+    uint32_t arena_bytes;
+    uint32_t beside_bytes; /* of the module's structure and workspace, which the caller holds beside the arena */
     uint32_t particles[FLIGHT_STEPS];
     float square; /* sum of the squared errors of the position, against the truth */
 } flown_t;
 
-#define FLIGHTS 10u
+#define FLIGHTS 13u
 extern const char *const flight_names[FLIGHTS];
 
 /* False when a call of the library failed. Every estimate goes through mix(). budget_cycles: for the adaptive filter, which

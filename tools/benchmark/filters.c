@@ -1,7 +1,8 @@
 /* Flies each kind of filter once (test/bits/flights.h) and prints a line for it: hash of all estimates, particle-steps,
- * cycles of the port's counter over all and of the worst cycle, overruns, root mean square error of the position in um, particles cycle by cycle. Then
- * the adaptive filter by time: with all the time it wants, and with 60 % of what its worst cycle took. Without an operating
- * system too; tools/filters runs it and explains the figures. */
+ * cycles of the port's counter over all and of the worst cycle, overruns, bytes of the arena and of what the module wants
+ * beside it, root mean square error of the position in um, particles cycle by cycle. Then the adaptive filter by time: with
+ * all the time it wants, and with 60 % of what its worst cycle took. Without an operating system too; tools/filters runs it
+ * and explains the figures. */
 #include "../../test/bits/flights.h"
 
 #include "io.h"
@@ -48,6 +49,8 @@ static bool fly(const char *name, uint32_t number, uint32_t budget_cycles, flown
     say(" worst=", flown->cycles_max);
     say(" budget=", budget_cycles);
     say(" overruns=", flown->overruns);
+    say(" arena=", flown->arena_bytes);
+    say(" beside=", flown->beside_bytes);
     say(" rms_um=", (uint32_t)(int32_t)(1.0e6f * pfl_sqrtf(flown->square / (float)FLIGHT_STEPS)));
     say(" particles=", flown->particles[0]);
     for (uint32_t k = 1u; k < FLIGHT_STEPS; k++) {

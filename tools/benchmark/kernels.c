@@ -84,6 +84,7 @@ int main(void)
     run_all(kernels_math, kernels_math_count);
     run_all(kernels_models, kernels_models_count);
     run_all(kernels_sensors, kernels_sensors_count);
+    run_all(kernels_recordings, kernels_recordings_count);
     run_all(kernels_per_particle, kernels_per_particle_count);
     run_all(kernels_filter, kernels_filter_count);
     return 0;

@@ -7,7 +7,7 @@
 
 #define KERNEL_N 1024u
 #define KERNEL_STATES 9u
-#define KERNEL_NOISES 4u
+#define KERNEL_NOISES 6u
 #define KERNEL_DT_S 0.1f
 
 /* What kernels read and write; filled anew, with the same values, before each of them. */
@@ -35,8 +35,9 @@ typedef struct {
     void kernel_##name(void);                                                                                          \
     __attribute__((noinline)) void kernel_##name(void)
 
-extern const kernel_t kernels_math[], kernels_models[], kernels_sensors[], kernels_per_particle[], kernels_filter[];
-extern const uint32_t kernels_math_count, kernels_models_count, kernels_sensors_count, kernels_per_particle_count,
-    kernels_filter_count;
+extern const kernel_t kernels_math[], kernels_models[], kernels_sensors[], kernels_recordings[], kernels_per_particle[],
+    kernels_filter[];
+extern const uint32_t kernels_math_count, kernels_models_count, kernels_sensors_count, kernels_recordings_count,
+    kernels_per_particle_count, kernels_filter_count;
 
 #endif

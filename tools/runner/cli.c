@@ -306,7 +306,7 @@ static void set_defaults(cli_t *cli)
 #endif
     memset(cli, 0, sizeof *cli);
     cli->seed = 2u;
-    cli->threads = processors < 1 ? 1u : (unsigned)processors;
+    cli->threads = processors < 1 ? 1u : (uint32_t)processors;
     cli->threads = cli->threads > THREADS_MAX ? THREADS_MAX : cli->threads;
     cli->out = "out";
     cli->data = data != NULL && data[0] != '\0' ? data : PFLIGHT_SOURCE_DIR "/../shared/data";

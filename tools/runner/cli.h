@@ -17,7 +17,7 @@ typedef struct {
     uint32_t particles;
     uint32_t runs;
     uint64_t seed;
-    unsigned threads; /* never zero */
+    uint32_t threads; /* never zero */
     double budget_us;
     const char *data; /* never null */
     const char *json;

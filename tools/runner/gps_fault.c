@@ -52,12 +52,13 @@ enum { COLUMNS = sizeof columns / sizeof columns[0] };
 
 /* ---- The recording ------------------------------------------------------------------------------------------------ */
 
+/* At the same time the fix comes first: qsort keeps no order of its own. */
 static int by_time(const void *a, const void *b)
 {
-    const double x = ((const event_t *)a)->t_s;
-    const double y = ((const event_t *)b)->t_s;
+    const event_t *x = (const event_t *)a;
+    const event_t *y = (const event_t *)b;
 
-    return (x > y) - (x < y);
+    return x->t_s > y->t_s || x->t_s < y->t_s ? (x->t_s > y->t_s) - (x->t_s < y->t_s) : (int)y->gps - (int)x->gps;
 }
 
 static void take_fix(fault_study_t *s, const double *row, const recording_t *baro)

@@ -34,6 +34,10 @@ class Failure(Exception):
         self.status = status
 
 
+class NoTape(Failure):
+    """A study that the recorder cannot put on a tape (record.c)."""
+
+
 # ---- Builds ------------------------------------------------------------------------------------------------------------
 
 
@@ -135,7 +139,8 @@ def runner(command, folder, **environment):
     done = subprocess.run(command, cwd=folder, env={**os.environ, **environment}, capture_output=True, text=True,
                           stdin=subprocess.DEVNULL, check=False)
     if done.returncode not in (0, 1):  # 1: outside the acceptance, which a single run may be
-        raise Failure(done.stderr.strip() or f"{command[0]} ended with {done.returncode}", done.returncode)
+        kind = NoTape if done.returncode == 4 else Failure
+        raise kind(done.stderr.strip() or f"{command[0]} ended with {done.returncode}", done.returncode)
     return command, json.loads(done.stdout)
 
 

@@ -68,3 +68,14 @@ def runs_here(machine):
 
 def find(name):
     return next(machine for machine in ALL if machine.name == name)
+
+
+# Boards with 16 MB of RAM for whole programs with a C library (tools/targets/whole), by the machine whose core they have.
+LARGE = {
+    "cortex-m4f": Machine("cortex-m4f-large", "Cortex-M4F, MPS2 AN386 with external RAM, bare metal",
+                          ("qemu-system-arm", "-M", "mps2-an386"), "arm-none-eabi-"),
+    "cortex-m7": Machine("cortex-m7-large", "Cortex-M7, MPS2 AN500 with external RAM, bare metal",
+                         ("qemu-system-arm", "-M", "mps2-an500"), "arm-none-eabi-"),
+    "cortex-m55": Machine("cortex-m55-large", "Cortex-M55 with Helium, MPS3 AN547 with DDR, bare metal",
+                          ("qemu-system-arm", "-M", "mps3-an547"), "arm-none-eabi-"),
+}

@@ -32,6 +32,13 @@ static void stop(const char *why)
     exit(3);
 }
 
+/* Nothing is wrong, but no tape can hold it: tools/target then flies the whole run, where it can. */
+static void no_tape(const char *why)
+{
+    (void)fprintf(stderr, "record: %s\n", why);
+    exit(4);
+}
+
 /* ---- Words ----------------------------------------------------------------------------------------------------------- */
 
 static void put_to(FILE *file, uint32_t word)
@@ -75,7 +82,7 @@ static void put_route(const unsigned char *at)
         return;
     }
     if (route->count > TAPE_WAYPOINTS_MAX) {
-        stop("a route with too many waypoints");
+        no_tape("a route with too many waypoints");
     }
     put(route->count);
     put(route->closed ? 1u : 0u);
@@ -240,7 +247,7 @@ static void put_model(void)
         id--;
     }
     if (id == 0u) {
-        stop("the predict callback of this study is not one of lib/");
+        no_tape("the predict callback of this study is not one of lib/");
     }
     model_u = tape_models[id].u;
     put(id);
@@ -274,7 +281,7 @@ static void put_extras(void)
             id--;
         }
         if (id == 0u || config.constraint->inside != pfl_ring_inside) {
-            stop("the constraint of this study is not one of lib/");
+            no_tape("the constraint of this study is not one of lib/");
         }
     }
     put(id);
@@ -348,7 +355,7 @@ WRAP(pfl_status_t, pfl_init, (void *arena, size_t bytes, const pfl_config_t *c, 
 static void check_filter(const pfl_t *f)
 {
     if (f != filter) {
-        stop("this study flies several filters at a time");
+        no_tape("this study flies several filters at a time");
     }
 }
 
@@ -387,7 +394,7 @@ static void put_z(uint16_t sensor, const void *z)
             return;
         }
     }
-    stop("a sensor of this study is not one of lib/");
+    no_tape("a sensor of this study is not one of lib/");
 }
 
 WRAP(pfl_status_t, pfl_update, (pfl_t * f, uint16_t sensor, uint64_t t_us, const void *z))
@@ -432,7 +439,7 @@ WRAP(pfl_status_t, pfl_farthest,
     put((uint32_t)TAPE_FARTHEST);
     put(f == filter ? 0u : 1u);
     if (f != filter && f != ahead) {
-        stop("this study flies several filters at a time");
+        no_tape("this study flies several filters at a time");
     }
     put(x_state);
     put(y_state);
@@ -469,7 +476,7 @@ WRAP(pfl_status_t, pfl_forecast,
 
     check_filter(f);
     if (horizon->visit != NULL) {
-        stop("a forecast of this study is looked at step by step, which no tape holds");
+        no_tape("a forecast of this study is looked at step by step, which no tape holds");
     }
     put((uint32_t)TAPE_FORECAST);
     put(cov != NULL ? 1u : 0u);

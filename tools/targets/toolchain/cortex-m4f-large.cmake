@@ -1,0 +1,12 @@
+# Cortex-M4F for programs with a C library and a heap: Arm MPS2 with AN386 (QEMU mps2-an386) and its 16 MB of external RAM.
+set(CMAKE_SYSTEM_NAME Generic)
+set(CMAKE_SYSTEM_PROCESSOR arm)
+set(CMAKE_C_COMPILER arm-none-eabi-gcc)
+set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
+set(CMAKE_C_FLAGS_INIT "-mcpu=cortex-m4 -mfpu=fpv4-sp-d16 -mthumb -mfloat-abi=hard")
+set(PFLIGHT_BOARD cortex_m)
+set(PFLIGHT_BOARD_FLASH 0x00000000)
+set(PFLIGHT_BOARD_FLASH_BYTES 0x400000)
+set(PFLIGHT_BOARD_RAM 0x21000000)
+set(PFLIGHT_BOARD_RAM_BYTES 0x1000000)
+set(PFLIGHT_BOARD_STACK_BYTES 0x40000)

@@ -1,0 +1,12 @@
+# Cortex-M7 for programs with a C library and a heap: Arm MPS2 with AN500 (QEMU mps2-an500) and its 16 MB of external RAM.
+set(CMAKE_SYSTEM_NAME Generic)
+set(CMAKE_SYSTEM_PROCESSOR arm)
+set(CMAKE_C_COMPILER arm-none-eabi-gcc)
+set(CMAKE_TRY_COMPILE_TARGET_TYPE STATIC_LIBRARY)
+set(CMAKE_C_FLAGS_INIT "-mcpu=cortex-m7 -mfpu=fpv5-d16 -mthumb -mfloat-abi=hard")
+set(PFLIGHT_BOARD cortex_m)
+set(PFLIGHT_BOARD_FLASH 0x00000000)
+set(PFLIGHT_BOARD_FLASH_BYTES 0x400000)
+set(PFLIGHT_BOARD_RAM 0x60000000)
+set(PFLIGHT_BOARD_RAM_BYTES 0x1000000)
+set(PFLIGHT_BOARD_STACK_BYTES 0x40000)
