@@ -292,8 +292,8 @@ pfl_status_t pfl_estimate(pfl_t *f, float *mean, float *cov);
 pfl_status_t pfl_most_likely(const pfl_t *f, float *state);
 
 /* Smallest value v of a state for which the weight of particles <= v reaches the share p of all. state: 0 .. D-1;
- * p: 0 < p <= 1. Angles are taken as they stand in the particles. PFL_OK, PFL_ERR_BUSY, PFL_ERR_ARG,
- * PFL_ERR_CORRUPT. O(33 N), no memory. */
+ * p: 0 < p <= 1. Angles are taken as they stand in the particles. PFL_OK, PFL_ERR_BUSY, PFL_ERR_ARG, PFL_ERR_CORRUPT,
+ * PFL_ERR_NONFINITE (a particle damaged since the last predict). O(33 N), no memory. */
 pfl_status_t pfl_quantile(pfl_t *f, uint16_t state, float p, float *value);
 
 /* Effective sample size 1 / sum w_i^2 of the last update, before its resampling: 1 .. N; N before the first update.
