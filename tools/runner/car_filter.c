@@ -2,6 +2,7 @@
  * whose long side forgives; a Gaussian instead of that, or odometry alone, for comparison. */
 #include "car.h"
 #include "cloud.h"
+#include "host_filter.h"
 #include "host_random.h"
 
 #include <math.h>
@@ -168,14 +169,9 @@ bool car_filter(const car_study_t *s, uint32_t run, float *estimate, run_output_
         .draw = draw,
         .user = &model,
     };
-    const size_t bytes = pfl_arena_bytes(&config);
-    void *arena = malloc(bytes);
-    pfl_t *f;
-    if (arena == NULL) {
-        return fail(failure, EXIT_HARNESS, "no memory for %lu particles", (unsigned long)s->particles);
-    }
-    const bool driven = check(pfl_init(arena, bytes, &config, 0u, &f), "pfl_init", 0u, failure) &&
-                        drive(s, &model, f, estimate, out, failure);
+    void *arena;
+    pfl_t *f = host_filter(&config, &arena, failure);
+    const bool driven = f != NULL && drive(s, &model, f, estimate, out, failure);
     free(arena);
     return driven;
 }

@@ -1,6 +1,7 @@
 /* The scenario `gps-fault`: a quadrotor's GPS runs away, twice. Height stands on the barometer, and a fix counts as a
  * whole: one whose height or climb the cloud cannot explain is refused with its position. */
 #include "gps_fault.h"
+#include "host_filter.h"
 
 #include "cloud.h"
 #include "hash.h"
@@ -318,14 +319,9 @@ static bool run_once(const plan_t *plan, uint32_t run, run_output_t *out, failur
         .draw = draw,
         .user = &model,
     };
-    const size_t bytes = pfl_arena_bytes(&config);
-    void *arena = malloc(bytes);
-    pfl_t *f;
-    if (arena == NULL) {
-        return fail(failure, EXIT_HARNESS, "no memory for %lu particles", (unsigned long)s->particles);
-    }
-    const bool flown =
-        check(pfl_init(arena, bytes, &config, 0u, &f), "pfl_init", 0u, failure) && fly(f, s, out, failure);
+    void *arena;
+    pfl_t *f = host_filter(&config, &arena, failure);
+    const bool flown = f != NULL && fly(f, s, out, failure);
     free(arena);
     return flown;
 }

@@ -2,6 +2,7 @@
  * gps_particles_turn configured. */
 #include "cloud.h"
 #include "gps.h"
+#include "host_filter.h"
 #include "host_random.h"
 
 #include <math.h>
@@ -161,7 +162,6 @@ bool gps_particle_filter(const gps_study_t *study, bool coloured, uint32_t run, 
                          gps_estimate_t *estimate, look_t *look, failure_t *failure)
 {
     gps_particles_t particles;
-    pfl_t *filter;
 
     memset(&particles, 0, sizeof particles);
     memset(estimate, 0, sizeof *estimate);
@@ -169,13 +169,9 @@ bool gps_particle_filter(const gps_study_t *study, bool coloured, uint32_t run, 
     particles.track = track;
     particles.coloured = coloured;
     const pfl_config_t config = make_config(&particles, run);
-    const size_t bytes = PFL_ARENA_BYTES(config.particles, config.states, config.noises);
-    void *arena = malloc(bytes);
-    if (arena == NULL) {
-        return fail(failure, EXIT_HARNESS, "no memory for %lu particles", (unsigned long)study->particles);
-    }
-    const bool flown = check(pfl_init(arena, bytes, &config, 0u, &filter), "pfl_init", 0u, failure) &&
-                       fly(&particles, &config, filter, estimate, look, failure);
+    void *arena;
+    pfl_t *filter = host_filter(&config, &arena, failure);
+    const bool flown = filter != NULL && fly(&particles, &config, filter, estimate, look, failure);
     free(arena);
     return flown;
 }

@@ -1,5 +1,6 @@
 /* pflight itself on the land vehicle: configuration, prior, and the loop that a flight computer would run. */
 #include "cloud.h"
+#include "host_filter.h"
 #include "host_random.h"
 #include "land_vehicle.h"
 
@@ -161,15 +162,9 @@ bool land_particle_filter(const land_study_t *study, uint32_t run, const land_tr
     model_t model;
     set_model(study, &model);
     const pfl_config_t config = make_config(study, run, &model);
-    const size_t bytes = PFL_ARENA_BYTES(config.particles, config.states, config.noises);
-    void *arena = malloc(bytes);
-    pfl_t *filter;
-
-    if (arena == NULL) {
-        return fail(failure, EXIT_HARNESS, "no memory for %lu particles", (unsigned long)study->particles);
-    }
-    const bool flown = check(pfl_init(arena, bytes, &config, 0u, &filter), "pfl_init", 0u, failure) &&
-                       fly(study, filter, track, estimate, look, failure);
+    void *arena;
+    pfl_t *filter = host_filter(&config, &arena, failure);
+    const bool flown = filter != NULL && fly(study, filter, track, estimate, look, failure);
     free(arena);
     return flown;
 }

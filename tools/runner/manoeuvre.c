@@ -2,6 +2,7 @@
  * its position is measured. One model of constant velocity, calm, wild, or a compromise; and two models that each particle
  * jumps between, with and without a minimum of particles in each. All filters see the same data. */
 #include "manoeuvre.h"
+#include "host_filter.h"
 
 #include "cloud.h"
 #include "hash.h"
@@ -181,14 +182,13 @@ static bool fly(const manoeuvre_study_t *s, uint32_t run, int which, const track
     static const uint64_t period_us = (uint64_t)(PERIOD_S * 1e6);
     model_t m;
     set_model(s, run, which, t, &m);
-    const size_t bytes = pfl_arena_bytes(&m.config);
-    void *arena = malloc(bytes);
-    pfl_t *f = NULL;
-
-    if (arena == NULL) {
-        return fail(failure, EXIT_HARNESS, "no memory for %lu particles", (unsigned long)s->particles);
+    void *arena;
+    pfl_t *f = host_filter(&m.config, &arena, failure);
+    if (f == NULL) {
+        free(arena);
+        return false;
     }
-    pfl_status_t status = pfl_init(arena, bytes, &m.config, 0u, &f);
+    pfl_status_t status = PFL_OK;
     for (uint32_t k = 0u; k < STEPS && status == PFL_OK; k++) {
         float mean[STATES];
         float probability[2] = {0.0f, 0.0f};

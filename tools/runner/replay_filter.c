@@ -1,6 +1,7 @@
 /* The filters of `replay`: a model and the sensors that it can see, nothing but what lib/ has ready. */
 #include "cloud.h"
 #include "hash.h"
+#include "host_filter.h"
 #include "replay.h"
 
 #include <math.h>
@@ -407,16 +408,11 @@ static bool fly(const replay_study_t *s, setup_t *u, pfl_t *filter, run_output_t
 bool replay_fly(const replay_study_t *s, uint32_t run, run_output_t *out, failure_t *failure)
 {
     setup_t u;
-    pfl_t *filter;
+    void *arena;
 
     make_setup(s, run, &u);
-    const size_t bytes = pfl_arena_bytes(&u.config);
-    void *arena = malloc(bytes + 1u);
-    if (arena == NULL) {
-        return fail(failure, EXIT_HARNESS, "no memory for %lu particles", (unsigned long)s->particles);
-    }
-    const bool flown = check(pfl_init(arena, bytes, &u.config, 0u, &filter), "pfl_init", 0u, failure) &&
-                       fly(s, &u, filter, out, failure);
+    pfl_t *filter = host_filter(&u.config, &arena, failure);
+    const bool flown = filter != NULL && fly(s, &u, filter, out, failure);
     free(arena);
     return flown;
 }

@@ -3,6 +3,7 @@
  * particle filter is its distance from that. Every filter sees the same data; the bootstrap filter also flies with ten
  * times the particles. */
 #include "sharp.h"
+#include "host_filter.h"
 
 #include "cloud.h"
 #include "hash.h"
@@ -258,14 +259,13 @@ static bool fly(const sharp_study_t *s, uint32_t run, int which, const track_t *
 {
     model_t m;
     set_model(s, run, which, &m);
-    const size_t bytes = pfl_arena_bytes(&m.config);
-    void *arena = malloc(bytes);
-    pfl_t *f = NULL;
-
-    if (arena == NULL) {
-        return fail(failure, EXIT_HARNESS, "no memory for %lu particles", (unsigned long)m.config.particles);
+    void *arena;
+    pfl_t *f = host_filter(&m.config, &arena, failure);
+    if (f == NULL) {
+        free(arena);
+        return false;
     }
-    pfl_status_t status = pfl_init(arena, bytes, &m.config, 0u, &f);
+    pfl_status_t status = PFL_OK;
     for (uint32_t k = 0u; k < STEPS && status == PFL_OK; k++) {
         float mean[STATES_MAX];
         pfl_health_t health;

@@ -1,6 +1,7 @@
 /* pflight on the ranges: constant velocity outdoors, odometry and a global start indoors, one Student-t range sensor
  * for both. */
 #include "cloud.h"
+#include "host_filter.h"
 #include "host_random.h"
 #include "uwb_range.h"
 
@@ -179,15 +180,9 @@ bool uwb_filter(const uwb_study_t *s, uint32_t run, float *estimate, run_output_
     const pfl_sensor_t sensor = {.loglik = pfl_range_loglik, .user = &sensed};
     model_t model = make_model(s);
     const pfl_config_t config = make_config(s, run, &model, &sensor);
-    const size_t bytes = PFL_ARENA_BYTES(config.particles, config.states, config.noises);
-    void *arena = malloc(bytes);
-    pfl_t *filter;
-
-    if (arena == NULL) {
-        return fail(failure, EXIT_HARNESS, "no memory for %lu particles", (unsigned long)s->particles);
-    }
-    const bool flown = check(pfl_init(arena, bytes, &config, 0u, &filter), "pfl_init", 0u, failure) &&
-                       fly(s, filter, estimate, out, failure);
+    void *arena;
+    pfl_t *filter = host_filter(&config, &arena, failure);
+    const bool flown = filter != NULL && fly(s, filter, estimate, out, failure);
     free(arena);
     return flown;
 }

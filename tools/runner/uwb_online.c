@@ -1,6 +1,7 @@
 /* pflight on the ranges with nothing calibrated: biases are means that particles carry along, and indoors the wheels' scale
  * and turn bias are states. */
 #include "cloud.h"
+#include "host_filter.h"
 #include "host_random.h"
 #include "uwb_range.h"
 
@@ -167,15 +168,9 @@ bool uwb_online(const uwb_study_t *s, uint32_t run, float *estimate, run_output_
         .draw = draw,
         .user = &model,
     };
-    const size_t bytes = pfl_arena_bytes(&config);
-    void *arena = malloc(bytes);
-    pfl_t *filter;
-    if (arena == NULL) {
-        return fail(failure, EXIT_HARNESS, "no memory for %lu particles", (unsigned long)s->particles);
-    }
-    const pfl_status_t status = pfl_init(arena, bytes, &config, 0u, &filter);
-    const bool flown = status == PFL_OK ? fly(s, &model, filter, estimate, out, failure)
-                                        : fail(failure, EXIT_HARNESS, "pfl_init: %s", pfl_status_string(status));
+    void *arena;
+    pfl_t *filter = host_filter(&config, &arena, failure);
+    const bool flown = filter != NULL && fly(s, &model, filter, estimate, out, failure);
     free(arena);
     return flown;
 }
