@@ -248,6 +248,13 @@ class Replay(unittest.TestCase):
         self.assertIn("no column 'east_m'", done.stderr)
         self.assertIn("the sensor gps needs gps.csv", done.stderr)
 
+    def target_flies_it_too(self, folder, sensors, host):
+        if shutil.which("arm-none-eabi-gcc") is None or shutil.which("qemu-system-arm") is None:
+            return
+        done = tool("target", "run", "replay", "--target", "cortex-m4f", "--set", f"sensors={sensors}", "--set", "motion=6",
+                    "--json", "-", environment={"PFLIGHT_DATA": str(folder)})
+        self.assertEqual(json.loads(done.stdout)["hash"], host["hash"], done.stderr)
+
     def test_behind_a_gap_a_flight_of_its_own_begins(self):
         """Two minutes later and two kilometres away; the same in C and Python, and a lost filter when it may not."""
         import pflight
@@ -269,6 +276,8 @@ class Replay(unittest.TestCase):
                 mine = pflight.replay.fly(folder, model=model, sensors=tuple(sensors.split(",")), gap=gap, motion=6.0)
                 self.assertEqual(f"{mine.hash:016x}", host["hash"], f"{model} {sensors} gap {gap}")
                 self.assertEqual(host["metrics"]["restarts"]["mean"], 1 if gap else 0)
+                if gap and model == "cv":
+                    self.target_flies_it_too(folder, "gps,velocity", host)
             self.assertLess(found[60]["metrics"]["innovation_m"]["mean"], 4.0)
             self.assertGreater(found[0]["metrics"]["innovation_m"]["mean"], 100.0)  # so there is something to be gained
 

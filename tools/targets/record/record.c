@@ -433,6 +433,14 @@ WRAP(pfl_status_t, pfl_resample, (pfl_t * f))
     return answer_status(__real_pfl_resample(f));
 }
 
+WRAP(pfl_status_t, pfl_reset, (pfl_t * f, uint64_t t_us))
+{
+    check_filter(f);
+    put((uint32_t)TAPE_RESET);
+    put_u64(t_us);
+    return answer_status(__real_pfl_reset(f, t_us));
+}
+
 WRAP(pfl_status_t, pfl_farthest,
      (const pfl_t *f, uint16_t x_state, uint16_t y_state, float x, float y, float *distance))
 {

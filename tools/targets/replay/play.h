@@ -54,6 +54,7 @@ bool play_predict(play_t *p);
 bool play_update(play_t *p);
 bool play_estimate(play_t *p);
 bool play_resample(play_t *p);
+bool play_reset(play_t *p);
 bool play_farthest(play_t *p);
 bool play_ess(play_t *p);
 bool play_forecast(play_t *p);

@@ -269,6 +269,14 @@ bool play_resample(play_t *p)
     return true;
 }
 
+/* Reads the particles while it draws them: not counted. */
+bool play_reset(play_t *p)
+{
+    const uint64_t t_us = words_next_u64();
+    words_put(IO_OUT, (uint32_t)(int32_t)pfl_reset(p->filter, t_us));
+    return true;
+}
+
 /* ---- Answers ------------------------------------------------------------------------------------------------------------- */
 
 bool play_farthest(play_t *p)

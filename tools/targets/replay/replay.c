@@ -54,7 +54,7 @@ static const play_fn play_of[TAPE_OPS] = {
     [TAPE_INIT] = play_init,         [TAPE_PREDICT] = play_predict,       [TAPE_UPDATE] = play_update,
     [TAPE_ESTIMATE] = play_estimate, [TAPE_RESAMPLE] = play_resample,     [TAPE_FARTHEST] = play_farthest,
     [TAPE_ESS] = play_ess,           [TAPE_FORECAST] = play_forecast,     [TAPE_STANDOFF] = play_standoff,
-    [TAPE_LVFG] = play_lvfg,         [TAPE_NMPC_SOLVE] = play_nmpc_solve,
+    [TAPE_LVFG] = play_lvfg,         [TAPE_NMPC_SOLVE] = play_nmpc_solve, [TAPE_RESET] = play_reset,
 };
 
 static bool read_head(play_t *p)

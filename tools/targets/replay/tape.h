@@ -39,6 +39,7 @@ typedef enum {
     TAPE_STANDOFF, /* guidance, each: its arguments -> status, outputs; see calls.c */
     TAPE_LVFG,
     TAPE_NMPC_SOLVE,
+    TAPE_RESET, /* t_us; the particles of the prior follow in batches; -> status */
     TAPE_OPS
 } tape_op_t;
 
