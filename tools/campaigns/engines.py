@@ -2,6 +2,7 @@
 a shard became as soon as it is there, in any order."""
 import concurrent.futures
 import contextlib
+import itertools
 import os
 import shlex
 
@@ -52,13 +53,8 @@ def on_dask(jobs, workers, scheduler=None):
 
 def ranges(numbers):
     """0-3,5 of 0 1 2 3 5."""
-    parts = []
-    for n in numbers:
-        if parts and parts[-1][1] == n - 1:
-            parts[-1][1] = n
-        else:
-            parts.append([n, n])
-    return ",".join(f"{a}" if a == b else f"{a}-{b}" for a, b in parts)
+    groups = [[n for _, n in group] for _, group in itertools.groupby(enumerate(numbers), lambda pair: pair[1] - pair[0])]
+    return ",".join(f"{group[0]}-{group[-1]}" if len(group) > 1 else str(group[0]) for group in groups)
 
 
 def slurm_script(missing, folder):

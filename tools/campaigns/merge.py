@@ -1,40 +1,30 @@
 """Shards into one result: the same bytes whoever flew them, in whatever order. At a point each figure has one value a seed,
-the mean of that seed's runs; median and 95 % quantile are over the seeds."""
+the mean of that seed's runs; median and 95 % quantile (linear between neighbours) are over the seeds."""
 import math
 import statistics
 
 import sweep
 
 
-def quantile(values, share):
-    """Linear between the two that stand next to it."""
-    ordered, place = sorted(values), share * (len(values) - 1)
-    low = math.floor(place)
-    high = min(low + 1, len(ordered) - 1)
-    return ordered[low] + (place - low) * (ordered[high] - ordered[low])
-
-
 def figure_of(values):
-    known = [value for value in values if value is not None]
-    mean, n = math.fsum(known) / len(known), len(known)
-    error = math.sqrt(math.fsum((value - mean) ** 2 for value in known) / (n - 1) / n) if n > 1 else None
-    return {"median": statistics.median(known), "mean": mean, "stderr": error, "p95": quantile(known, 0.95), "values": values}
+    known, n = [value for value in values if value is not None], sum(value is not None for value in values)
+    mean = math.fsum(known) / n
+    return {"median": statistics.median(known), "mean": mean,
+            "stderr": math.sqrt(math.fsum((value - mean) ** 2 for value in known) / (n - 1) / n) if n > 1 else None,
+            "p95": statistics.quantiles(known, n=20, method="inclusive")[-1] if n > 1 else mean, "values": values}
 
 
 def point_of(settings, rows, runs):
     names = dict.fromkeys(name for row in rows for name in row["figures"])
-    figures = {name: figure_of([row["figures"].get(name) for row in rows]) for name in names}
     return {"settings": settings, "runs": runs * len(rows), "hash": sweep.digest("".join(row["hash"] for row in rows).encode()),
-            "figures": figures}
+            "figures": {name: figure_of([row["figures"].get(name) for row in rows]) for name in names}}
 
 
 def result_of(plan, shards):
     """shards: the rows of each, in their order."""
-    count = len(plan["points"])
-    points = [point_of(point, [row for rows in shards[i::count] for row in rows], plan["runs"])
-              for i, point in enumerate(plan["points"])]
+    rows = [[row for shard in shards[i::len(plan["points"])] for row in shard] for i in range(len(plan["points"]))]
     return {"schema": 1, **{key: plan[key] for key in ("scenario", "program", "data_digest", "seeds")},
-            "runs_of_a_seed": plan["runs"], "points": points}
+            "runs_of_a_seed": plan["runs"], "points": [point_of(*pair, plan["runs"]) for pair in zip(plan["points"], rows)]}
 
 
 def table(result):
@@ -48,6 +38,7 @@ def table(result):
         left = f"{label:<{wide}s} {point['runs']:>7d}"
         for name, figure in point["figures"].items():
             error = "" if figure["stderr"] is None else f"{figure['stderr']:.2g}"
-            lines.append(f"{left}  {name:<{long}s} {figure['median']:>10.4g} {figure['mean']:>10.4g} {error:>8s} {figure['p95']:>10.4g}")
+            lines.append(f"{left}  {name:<{long}s} {figure['median']:>10.4g} {figure['mean']:>10.4g} {error:>8s} "
+                         f"{figure['p95']:>10.4g}")
             left = " " * len(left)
     return "\n".join(lines)

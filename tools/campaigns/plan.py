@@ -15,21 +15,16 @@ import sweep
 from sweep import Failure
 
 
-def pair_of(option, entry):
-    key, equals, value = entry.partition("=")
-    if not (key and equals and value):
-        raise Failure(f"{option} {entry}: give KEY=VALUE{',VALUE' if option == '--grid' else ''}", 2)
-    return key, value
-
-
 def points_of(fixed, grid):
     """Every combination of the grid's values (A,B or, where values have commas themselves, A:B), with the fixed ones."""
-    pairs = [(key, [value]) for key, value in fixed] + [(key, values.split(":" if ":" in values else ",")) for key, values in grid]
-    for key, values in pairs:
-        if [other for other, _ in pairs].count(key) > 1 or len(set(values)) < len(values) or "" in values:
-            raise Failure(f"{key}: give it once, by --grid or by --set, and each value once", 2)
-    keys = [key for key, _ in pairs]
-    return [dict(zip(keys, chosen)) for chosen in itertools.product(*(values for _, values in pairs))]
+    values = {}
+    for entry, varied in [(entry, False) for entry in fixed] + [(entry, True) for entry in grid]:
+        key, _, text = entry.partition("=")
+        several = text.split(":" if ":" in text else ",") if varied else [text]
+        if not key or "" in several or key in values or len(set(several)) < len(several):
+            raise Failure(f"{entry}: give KEY=VALUE, after --grid KEY=VALUE,VALUE; each key and each value once", 2)
+        values[key] = several
+    return [dict(zip(values, chosen)) for chosen in itertools.product(*values.values())]
 
 
 def digest_of_folder(path):
@@ -94,9 +89,8 @@ class Folder:
     def jobs(self):
         """All shards, each with what a worker must know of it. All points come before the second shard of any: a wrong
         setting is soon found."""
-        first, last = self.plan["seeds"]
-        seeds = range(first, last + 1)
-        chunks = [list(seeds[start:start + self.plan["shard"]]) for start in range(0, len(seeds), self.plan["shard"])]
+        seeds, size = range(self.plan["seeds"][0], self.plan["seeds"][1] + 1), self.plan["shard"]
+        chunks = [list(seeds[start:start + size]) for start in range(0, len(seeds), size)]
         return [{"campaign": self.stamp(), "shard": k, "program": str(self.path / "program"), "digest": self.plan["program"],
                  "line": line_of(self.plan, point), "seeds": chunk}
                 for k, (chunk, point) in enumerate(itertools.product(chunks, self.plan["points"]))]
