@@ -39,15 +39,16 @@ def on_dask(jobs, workers, scheduler=None):
     import cloudpickle
     import distributed
     cloudpickle.register_pickle_by_value(shard)
+    fly = shard.fly  # a lambda of it is sent as code, where the function itself would be sent as a name
     with contextlib.ExitStack() as stack:
         try:
             where = scheduler or stack.enter_context(distributed.LocalCluster(
                 n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None))
             client = stack.enter_context(distributed.Client(where, timeout=20))
-            futures = [client.submit(shard.fly, job, key=f"{job['campaign']}-{job['shard']}") for job in jobs]
+            futures = [client.submit(lambda job: fly(job), job, key=f"{job['campaign']}-{job['shard']}") for job in jobs]
             for _, done in distributed.as_completed(futures, with_results=True):
                 yield done
-        except (OSError, distributed.KilledWorker, concurrent.futures.CancelledError) as error:
+        except Exception as error:  # no list of Dask's own is complete
             raise sweep.Failure(f"Dask: {' '.join(str(error).split())}") from error
 
 
