@@ -3,6 +3,7 @@ a shard became as soon as it is there, in any order."""
 import concurrent.futures
 import contextlib
 import itertools
+import logging
 import os
 import shlex
 
@@ -35,7 +36,8 @@ def on_processes(jobs, workers):
 
 def on_dask(jobs, workers, scheduler=None):
     """A shard whose worker dies goes to another one; more than three such deaths are taken to be its own fault."""
-    os.environ.setdefault("DASK_LOGGING__DISTRIBUTED", "critical")  # a lost worker is no news
+    os.environ["DASK_LOGGING__DISTRIBUTED"] = "critical"  # of the workers; a lost one is no news
+    logging.disable()
     import cloudpickle
     import distributed
     cloudpickle.register_pickle_by_value(shard)
@@ -46,8 +48,8 @@ def on_dask(jobs, workers, scheduler=None):
                 n_workers=workers, threads_per_worker=1, processes=True, dashboard_address=None))
             client = stack.enter_context(distributed.Client(where, timeout=20))
             futures = [client.submit(lambda job: fly(job), job, key=f"{job['campaign']}-{job['shard']}") for job in jobs]
-            for _, done in distributed.as_completed(futures, with_results=True):
-                yield done
+            for future in distributed.as_completed(futures):
+                yield future.result()
         except Exception as error:  # no list of Dask's own is complete
             raise sweep.Failure(f"Dask: {' '.join(str(error).split())}") from error
 
