@@ -40,6 +40,11 @@ def line_of(plan, point):
     return line
 
 
+def refuse_error(done):
+    if "error" in done:
+        raise Failure(done["error"], done["status"])
+
+
 class Folder:
     def __init__(self, path):
         self.path = pathlib.Path(path).resolve()
@@ -79,8 +84,7 @@ class Folder:
             return None
 
     def keep(self, done):
-        if "error" in done:
-            raise Failure(done["error"], done["status"])
+        refuse_error(done)
         shard = json.dumps({"plan": self.stamp(), "rows": done.pop("rows")})
         sweep.write_whole(self.path / f"shards/{done['shard']}.json", shard + "\n")
         with open(self.path / "log.jsonl", "a") as log:
