@@ -21,10 +21,11 @@ def point_of(settings, rows, runs):
 
 
 def result_of(plan, shards):
-    """shards: the rows of each, in their order."""
-    rows = [[row for shard in shards[i::len(plan["points"])] for row in shard] for i in range(len(plan["points"]))]
+    """shards: rows and libm of each, in their order."""
+    rows = [[row for rows, _ in shards[i::len(plan["points"])] for row in rows] for i in range(len(plan["points"]))]
+    points = [point_of(settings, of_point, plan["runs"]) for settings, of_point in zip(plan["points"], rows)]
     return {"schema": 1, **{key: plan[key] for key in ("scenario", "program", "data_digest", "seeds")},
-            "runs_of_a_seed": plan["runs"], "points": [point_of(*pair, plan["runs"]) for pair in zip(plan["points"], rows)]}
+            "runs_of_a_seed": plan["runs"], "libm": sorted({libm for _, libm in shards}), "points": points}
 
 
 def table(result):

@@ -76,16 +76,16 @@ class Folder:
         return sweep.digest(json.dumps(self.plan).encode())
 
     def load(self, k):
-        """A shard's rows; none where it is missing, spoilt, or of another plan."""
+        """A shard's rows and libm; none where it is missing, spoilt, or of another plan."""
         try:
             stored = json.loads((self.path / f"shards/{k}.json").read_text())
-            return stored["rows"] if stored["plan"] == self.stamp() else None
+            return (stored["rows"], stored["libm"]) if stored["plan"] == self.stamp() else None
         except (OSError, ValueError, KeyError, TypeError):
             return None
 
     def keep(self, done):
         refuse_error(done)
-        shard = json.dumps({"plan": self.stamp(), "rows": done.pop("rows")})
+        shard = json.dumps({"plan": self.stamp(), "libm": done.pop("libm"), "rows": done.pop("rows")})
         sweep.write_whole(self.path / f"shards/{done['shard']}.json", shard + "\n")
         with open(self.path / "log.jsonl", "a") as log:
             log.write(json.dumps(done) + "\n")
