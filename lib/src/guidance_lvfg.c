@@ -26,8 +26,12 @@ pfl_status_t pfl_standoff_step(const pfl_standoff_t *standoff, float reach_m, fl
     const float wanted = pfl_clip(standoff->reach_gain * reach_m, standoff->min_m, standoff->max_m);
     const float most = standoff->rate_max_mps * dt_s;
     const float change = (state->steps == 0u) ? 0.0f : pfl_clip(wanted - state->distance_m, -most, most);
+    const float rate = change / dt_s;
+    if (!pfl_is_finite(rate)) { /* nor is the distance then, if it is not */
+        return PFL_ERR_NONFINITE;
+    }
     state->distance_m = (state->steps == 0u) ? wanted : (state->distance_m + change);
-    state->rate_mps = change / dt_s;
+    state->rate_mps = rate;
     state->wanted_m = wanted;
     state->steps += (state->steps < UINT32_MAX) ? 1u : 0u;
     return PFL_OK;

@@ -59,7 +59,8 @@ typedef struct {
     uint32_t steps;
 } pfl_standoff_state_t;
 
-/* reach_m: largest distance of a particle from the estimate, >= 0; dt_s > 0: time since the last step. */
+/* reach_m: largest distance of a particle from the estimate, >= 0; dt_s > 0: time since the last step. PFL_OK, PFL_ERR_ARG,
+ * PFL_ERR_NONFINITE (a rate beyond single precision); `state` is untouched then. O(1). */
 pfl_status_t pfl_standoff_step(const pfl_standoff_t *standoff, float reach_m, float dt_s, pfl_standoff_state_t *state);
 
 /* ---- Lyapunov vector field guidance -------------------------------------------------------------------------------- */
