@@ -8,8 +8,8 @@
 
 static bool rule_is_good(const pfl_standoff_t *rule)
 {
-    return (rule->reach_gain > 0.0f) && (rule->min_m > 0.0f) && (rule->min_m < rule->max_m) &&
-           pfl_is_finite(rule->max_m) && (rule->rate_max_mps > 0.0f);
+    return (rule->reach_gain > 0.0f) && pfl_is_finite(rule->reach_gain) && (rule->min_m > 0.0f) &&
+           (rule->min_m < rule->max_m) && pfl_is_finite(rule->max_m) && (rule->rate_max_mps > 0.0f);
 }
 
 static bool step_is_good(const pfl_standoff_t *standoff, float reach_m, float dt_s, const pfl_standoff_state_t *state)
@@ -27,7 +27,7 @@ pfl_status_t pfl_standoff_step(const pfl_standoff_t *standoff, float reach_m, fl
     const float most = standoff->rate_max_mps * dt_s;
     const float change = (state->steps == 0u) ? 0.0f : pfl_clip(wanted - state->distance_m, -most, most);
     const float rate = change / dt_s;
-    if (!pfl_is_finite(rate)) { /* nor is the distance then, if it is not */
+    if (!pfl_is_finite(rate)) { /* the distance is: it stays between two that are */
         return PFL_ERR_NONFINITE;
     }
     state->distance_m = (state->steps == 0u) ? wanted : (state->distance_m + change);

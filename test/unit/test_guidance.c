@@ -77,6 +77,9 @@ void test_standoff_refuses_each_bad_number_alone(void)
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_standoff_step(NULL, 40.0f, 0.5f, &state));
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_standoff_step(&good, 40.0f, 0.5f, NULL));
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_standoff_step(&good, 40.0f, (float)INFINITY, &state));
+    pfl_standoff_t steep = good;
+    steep.reach_gain = (float)INFINITY;
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_standoff_step(&steep, 0.0f, 0.5f, &state));
     pfl_standoff_t sudden = good;
     sudden.rate_max_mps = (float)INFINITY;
     TEST_ASSERT_EQUAL_INT(PFL_ERR_NONFINITE, pfl_standoff_step(&sudden, 40.0f, 1e-38f, &state));
