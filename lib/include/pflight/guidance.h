@@ -46,8 +46,7 @@ typedef struct {
 /* ---- Standoff distance ------------------------------------------------------------------------------------------- */
 
 typedef struct {
-    float
-        reach_gain; /* > 0, finite: distance per metre of reach: 1 / sin(half the usable view angle) keeps the cloud in view */
+    float reach_gain;   /* > 0, finite; 1 / sin(half the usable view angle) keeps a cloud of that reach in view */
     float min_m, max_m; /* 0 < min < max */
     float rate_max_mps; /* how fast the distance may change: a cloud that collapses must not make it jump. > 0 */
 } pfl_standoff_t;
