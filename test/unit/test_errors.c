@@ -209,6 +209,11 @@ void test_drifting_states_have_their_statistics(void)
     const pfl_batch_t batch = {x, WALKERS, noise, 0u, 1u};
     pfl_drift_predict(&drift, NULL, 0.5f, &batch);
     TEST_ASSERT_EQUAL_FLOAT(60.0f, x[0]);
+    drift.tau_s[0] = 0.5f; /* short, and still no walk */
+    x[WALKERS] = 1.0f;
+    memset(noise, 0, sizeof noise);
+    pfl_drift_predict(&drift, NULL, 0.5f, &batch);
+    TEST_ASSERT_FLOAT_WITHIN(1e-6f, 0.36787944f, x[WALKERS]);
 }
 
 void test_the_mixture_counts_from_its_better_side(void)

@@ -198,6 +198,10 @@ void test_a_reset_settles_and_its_score_is_no_better_than_before(void)
     TEST_ASSERT_TRUE((health_of(f).event & PFL_EVENT_RESET) != 0u);
     cycles(f, 10u);
     expect_phase(f, PFL_PHASE_TRACKING);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_reset(f, now_us));
+    (void)cycle(f, 10000.0f);
+    expect_phase(f, PFL_PHASE_SETTLING);
+    TEST_ASSERT_TRUE(health_of(f).test_ratio > (2.0f * before)); /* and what is worse than before is told */
 }
 
 void test_a_lean_cloud_degrades_at_the_second_update(void)
