@@ -433,7 +433,9 @@ void test_a_tempered_update_ends_with_its_budget(void)
 void test_wrong_calls_are_refused(void)
 {
     adaptive.error = 0.05f;
+    adaptive.covered = 77u;
     pfl_t *f = start();
+    TEST_ASSERT_EQUAL_UINT32(0u, adaptive.covered); /* nothing yet */
     pfl_adaptive_t other = adaptive;
     const pfl_adaptive_t good = adaptive;
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_adapt(NULL, &adaptive));

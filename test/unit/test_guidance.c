@@ -180,6 +180,8 @@ void test_lvfg_refuses_bad_input_and_touches_nothing(void)
     TEST_ASSERT_EQUAL_INT(PFL_ERR_ARG, pfl_lvfg_command(&lvfg, pair, 2u, &estimate, &standoff, command));
     TEST_ASSERT_EQUAL_FLOAT(1.0f, command[0].speed_mps);
     TEST_ASSERT_EQUAL_FLOAT(4.0f, command[1].turn_radps);
+    lvfg.limits.turn_max_radps = 0.001f; /* slow is not bad */
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_lvfg_command(&lvfg, pair, 2u, &estimate, &standoff, command));
 }
 
 static pfl_status_t lvfg_with(const pfl_lvfg_t *lvfg, const pfl_uav_t *uav, const pfl_target_t *target,

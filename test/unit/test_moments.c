@@ -198,6 +198,12 @@ void test_moments_beyond_single_precision_are_refused_untouched(void)
     TEST_ASSERT_EQUAL_INT(PFL_ERR_NONFINITE, pfl_estimate(f, mean, cov));
     TEST_ASSERT_EACH_EQUAL_HEX8(0x77, mean, sizeof mean);
     TEST_ASSERT_EACH_EQUAL_HEX8(0x77, cov, sizeof cov);
+    make_cloud(N, 2u, 0.0, 1.0); /* any of the states is enough */
+    for (uint32_t i = 0u; i < N; i++) {
+        x[i] = ((i & 1u) != 0u) ? 3.0e38f : -3.0e38f;
+    }
+    f = weighed(N, 2u, 0u, PFL_MOMENTS_FULL);
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_NONFINITE, pfl_estimate(f, mean, cov));
 }
 
 void test_effective_sample_size_matches_its_formula(void)

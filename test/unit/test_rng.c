@@ -118,6 +118,18 @@ void test_seed_is_spread_by_splitmix(void)
     TEST_ASSERT_TRUE(((uint64_t)s[2] | ((uint64_t)s[3] << 32)) == 3203168211198807973u);
 }
 
+void test_seed_and_jump_write_nothing_behind(void)
+{
+    struct {
+        pfl_rng_t rng;
+        uint32_t behind[2u * PFL_RNG_LANES];
+    } room;
+    memset(&room, 0x5A, sizeof room);
+    pfl_rng_seed(&room.rng, 3u);
+    pfl_rng_long_jump(&room.rng);
+    TEST_ASSERT_EACH_EQUAL_HEX8(0x5A, room.behind, sizeof room.behind);
+}
+
 void test_streams_are_two_to_the_64_steps_apart(void)
 {
     static matrix_t m;
