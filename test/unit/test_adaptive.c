@@ -449,6 +449,9 @@ void test_wrong_calls_are_refused(void)
     adaptive.bits = 48u;
     TEST_ASSERT_EQUAL_INT(PFL_ERR_CONFIG, pfl_adapt(f, &adaptive));
     adaptive = good;
+    adaptive.most = PFL_PARTICLES_MAX + 1u;
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_CONFIG, pfl_adapt(f, &adaptive));
+    adaptive = good;
     adaptive.state[1] = 2u;
     TEST_ASSERT_EQUAL_INT(PFL_ERR_CONFIG, pfl_adapt(f, &adaptive));
     adaptive = good;
