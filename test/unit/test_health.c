@@ -184,6 +184,25 @@ void test_a_stale_sensor_degrades_and_nothing_fused_for_long_loses(void)
     expect_phase(f, PFL_PHASE_LOST);
 }
 
+/* Of two sensors the worse one counts, whichever spoke last. */
+void test_the_ratio_told_is_the_worst_of_all_sensors(void)
+{
+    watched_t w;
+    make_watched(&w);
+    pfl_t *f = ut_filter(&w.config);
+    const float far = 5.0f;
+    const float near = 0.0f;
+    cycles(f, 3u);
+    (void)pfl_update(f, 1u, now_us, &far);
+    (void)pfl_update(f, 0u, now_us, &near);
+    pfl_sensor_health_t one;
+    pfl_sensor_health_t two;
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_sensor_health(f, 0u, &one));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_sensor_health(f, 1u, &two));
+    TEST_ASSERT_TRUE(two.test_ratio > one.test_ratio);
+    TEST_ASSERT_EQUAL_FLOAT(two.test_ratio, health_of(f).test_ratio);
+}
+
 void test_a_reset_settles_and_its_score_is_no_better_than_before(void)
 {
     watched_t w;

@@ -86,8 +86,12 @@ void test_cross_track_is_positive_to_the_left(void)
     /* Segment 0 to 1 runs along +y at x = 400: left is smaller x. */
     TEST_ASSERT_FLOAT_WITHIN(1.0e-4f, 30.0f, pfl_route_cross_track(&route, 1u, 370.0f, 123.0f));
     TEST_ASSERT_FLOAT_WITHIN(1.0e-4f, -25.0f, pfl_route_cross_track(&route, 1u, 425.0f, -9.0f));
+    const pfl_waypoint_t oblique[] = {{0.0f, 0.0f}, {300.0f, 400.0f}};
     route.closed = false;
     TEST_ASSERT_FLOAT_WITHIN(0.0f, 0.0f, pfl_route_cross_track(&route, 0u, 370.0f, 123.0f)); /* no segment before it */
+    route.waypoint = oblique;
+    route.count = 2u;
+    TEST_ASSERT_FLOAT_WITHIN(1.0e-4f, 60.0f, pfl_route_cross_track(&route, 1u, 0.0f, 100.0f));
 }
 
 void test_course_follows_the_vector_field(void)

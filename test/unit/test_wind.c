@@ -227,4 +227,8 @@ void test_a_gross_velocity_hardly_pulls(void)
     TEST_ASSERT_EQUAL_FLOAT(gain, wind.gain_velocity[1]);
     pfl_wind_weigh(&wind, mean, &gross);
     TEST_ASSERT_TRUE(wind.gain_velocity[1] < 0.6f * gain);
+    gross.vx_mps = 15.0f + 8.0f; /* a little too much widens a little: (4 + 64 / 27.89) / 6 times */
+    pfl_wind_weigh(&wind, mean, &gross);
+    TEST_ASSERT_FLOAT_WITHIN(1e-5f, 25.0f / (25.64f + (2.25f * ((4.0f + (64.0f / 27.89f)) / 6.0f))),
+                             wind.gain_velocity[1]);
 }
