@@ -16,18 +16,20 @@ static uint32_t count_outside_box(const pfl_t *f)
     return outside;
 }
 
-/* Log-weights that no update can have written. */
+/* Log-weights that no update can have written. One of them is at the top, where the heaviest particle stands. */
 uint32_t pfl_mend_log_weights(pfl_t *f)
 {
     uint32_t bad = 0u;
+    uint32_t lost = 1u;
     for (uint32_t i = 0u; i < f->config->particles; i++) {
         const float relative = f->log_weight[i] - f->log_weight_top;
         if (!pfl_is_not_nan(relative) || (relative > 0.0f)) {
             f->log_weight[i] = pfl_from_bits((int32_t)0xFF800000u);
             bad++;
         }
+        lost = (relative >= 0.0f) ? 0u : lost;
     }
-    return bad;
+    return bad + lost;
 }
 
 static bool best_is_finite(const pfl_t *f)

@@ -582,6 +582,24 @@ void test_scrub_mends_particles_weights_and_streams(void)
     cycles(f, 3u);
 }
 
+/* Nothing is above the top then, and nothing at it. */
+void test_scrub_finds_the_heaviest_particle_anew_when_its_weight_has_dropped(void)
+{
+    watched_t w;
+    make_watched(&w);
+    w.config.ess_ratio = 0.0f;
+    pfl_t *f = ut_filter(&w.config);
+    cycles(f, 3u);
+    const uint32_t heaviest = f->best_index;
+    f->log_weight[heaviest] -= 100.0f;
+    TEST_ASSERT_FALSE(pfl_invariants_hold(f));
+    uint32_t mended = 0u;
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_scrub(f, &mended));
+    TEST_ASSERT_EQUAL_UINT32(1u, mended);
+    TEST_ASSERT_TRUE(pfl_invariants_hold(f));
+    TEST_ASSERT_TRUE(f->best_index != heaviest);
+}
+
 void test_dead_streams_are_seeded_anew_by_the_next_predict(void)
 {
     watched_t w;
