@@ -385,6 +385,20 @@ void test_gate_refuses_beyond_it_and_tells_the_ratio(void)
     TEST_ASSERT_EQUAL_UINT32(2u, health_of(f).fused);
 }
 
+/* -2 times the best log-likelihood equals the gate: the ratio is one to the bit, and within. */
+void test_the_gate_itself_is_within(void)
+{
+    const pfl_sensor_t gated = {.loglik = ut_dictated_loglik, .gate = 8.0f};
+    pfl_config_t c = ut_dictated_config(N, 1u);
+    c.sensors = &gated;
+    pfl_t *f = ut_filter(&c);
+    for (uint32_t i = 0u; i < N; i++) {
+        ll[i] = -4.0f;
+    }
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_update(f, 0u, 0u, ll));
+    TEST_ASSERT_EQUAL_HEX32(ut_bits(1.0f), ut_bits(health_of(f).test_ratio));
+}
+
 /* Within the rounding slack a log-likelihood may be positive: its ratio is zero, never negative. */
 void test_the_ratio_of_a_match_better_than_perfect_is_zero(void)
 {

@@ -428,6 +428,28 @@ void test_nmpc_gradient_is_that_of_the_cost(void)
     }
 }
 
+/* The penalty alone, with all other weights zero: half of it times the square of what is too much, as a share of the
+ * range, whichever way. */
+void test_nmpc_penalty_is_the_same_both_ways(void)
+{
+    situation_t s;
+    make_situation(&s, 0u);
+    s.problem.pair = NULL;
+    s.nmpc.distance_weight = s.nmpc.distance_weight_last = 0.0f;
+    s.nmpc.phase_weight = s.nmpc.phase_weight_last = 0.0f;
+    s.nmpc.speed_weight = s.nmpc.turn_weight = 0.0f;
+    const pfl_uav_limits_t *l = &s.nmpc.limits;
+    const double range = (double)(1.5f * l->speed_range_mps);
+    const pfl_nmpc_plan_t slow = constant_plan((float)((double)l->cruise_mps - range), -1.5f * l->turn_max_radps);
+    const pfl_nmpc_plan_t fast = constant_plan((float)((double)l->cruise_mps + range), 1.5f * l->turn_max_radps);
+    const float expected = 0.5f * s.nmpc.penalty * (float)PFL_NMPC_STEPS * (0.25f + 0.25f);
+    float cost;
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_cost(&s.nmpc, &s.problem, &slow, &work, &cost, NULL));
+    TEST_ASSERT_FLOAT_WITHIN(1e-5f * expected, expected, cost);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_cost(&s.nmpc, &s.problem, &fast, &work, &cost, NULL));
+    TEST_ASSERT_FLOAT_WITHIN(1e-5f * expected, expected, cost);
+}
+
 void test_nmpc_never_gets_worse_and_keeps_its_bound(void)
 {
     uint32_t most = 0u;

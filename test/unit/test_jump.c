@@ -368,6 +368,33 @@ void test_thirteen_particles_are_enough(void)
     }
 }
 
+/* An ordinary resampling leaves its lists in the column of weights, behind the last particle too. */
+void test_what_an_ordinary_resampling_left_behind_weighs_nothing(void)
+{
+    float before[3];
+    float after[3];
+    float loglik[13];
+    for (uint32_t i = 0u; i < 13u; i++) {
+        table[i] = (float)(int32_t)i;
+        table[13u + i] = (float)(int32_t)(i % 3u);
+        loglik[i] = (i < 3u) ? 0.0f : -20.0f; /* few parents, so that the lists are long */
+    }
+    const ut_table_t few = {table, 13u, STATES};
+    pfl_config_t config = ut_dictated_config(13u, STATES);
+    config.draw = ut_table_draw;
+    config.user = (void *)(uintptr_t)&few;
+    jump.least = 1u;
+    pfl_t *f = ut_filter(&config);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_update(f, 0u, 0u, loglik));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_resample(f));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_jump_probabilities(f, &jump, before));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_jump_resample(f, &jump));
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_jump_probabilities(f, &jump, after));
+    for (uint32_t r = 0u; r < 3u; r++) {
+        TEST_ASSERT_FLOAT_WITHIN(2e-6f, before[r], after[r]);
+    }
+}
+
 void test_fewer_particles_than_regimes_times_regimes_are_refused(void)
 {
     const pfl_config_t eight = ut_dictated_config(8u, STATES);
