@@ -337,6 +337,9 @@ void test_wrong_calls_are_refused(void)
     jump = good;
     jump.states = STATES + 1u;
     TEST_ASSERT_EQUAL_INT(PFL_ERR_CONFIG, pfl_jump_resample(f, &jump));
+    jump.state = X;
+    jump.states = STATES - 1u;
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_CONFIG, pfl_jump_resample(f, &jump));
 }
 
 /* ---- Few particles ---------------------------------------------------------------------------------------------------- */

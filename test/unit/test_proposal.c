@@ -141,6 +141,23 @@ void test_a_component_without_noise_is_only_weighed(void)
     }
 }
 
+/* Nor does such a component touch what it does not drive, however far off the measurement is. */
+void test_a_component_that_drives_no_other_leaves_it_alone(void)
+{
+    const float z[2] = {3.0e38f, 3.0e38f};
+    float expected[STATES * N];
+    const pfl_batch_t other = {expected, N, noise, 0u, N};
+    for (uint32_t i = 0u; i < N; i++) {
+        x[i] = -3.0e38f;
+    }
+    memcpy(expected, x, sizeof x);
+    pfl_constant_velocity_predict(&still, NULL, DT_S, &other);
+    proposal.count = 1u;
+    proposal.sigma_other[0] = 0.0f;
+    move(z);
+    TEST_ASSERT_EQUAL_MEMORY(&expected[PFL_CV_VX * N], &x[PFL_CV_VX * N], sizeof(float) * N);
+}
+
 /* ---- A sharp measurement: a random walk with steps of 1, seen to 0.02 --------------------------------------------- */
 
 #define STEPS 200u

@@ -215,6 +215,24 @@ void test_road_target_never_leaves_the_road(void)
     }
 }
 
+/* Who would leave the road loses the speed across it, at either edge, and keeps the one along it; who is at the edge
+ * and on his way back keeps both. */
+void test_road_target_loses_its_speed_across_at_the_edges(void)
+{
+    pfl_road_target_t road = {0.0f, 0.0f, 96.0f, 100.0f, 0.0f, 0.0f};
+    const pfl_batch_t p = batch_of(3u);
+    const double turn_out = 0.5 * 5.0 / 100.0; /* along the edge where he ends up */
+    const double turn_in = 0.5 * 5.0 / 96.0;
+
+    set(0u, 98.0f, 0.0f, 20.0f, 5.0f);
+    set(1u, 98.0f, 0.0f, -20.0f, 5.0f);
+    set(2u, 100.0f, 0.0f, -2.0f, 0.0f);
+    pfl_road_target_predict(&road, NULL, 0.5f, &p);
+    expect(0u, 100.0 * cos(turn_out), 100.0 * sin(turn_out), -5.0 * sin(turn_out), 5.0 * cos(turn_out), 2e-5);
+    expect(1u, 96.0 * cos(turn_in), 96.0 * sin(turn_in), -5.0 * sin(turn_in), 5.0 * cos(turn_in), 2e-5);
+    expect(2u, 99.0, 0.0, -2.0, 0.0, 2e-5);
+}
+
 void test_lane_target_moves_and_mixes_as_it_says(void)
 {
     pfl_lane_target_t lane = {(float)(0.6 * sqrt(0.5)), 1.0f, 6.0f, 2.0f, 0.7f, (float)(-0.5 / log(0.9))};

@@ -170,6 +170,39 @@ void test_known_air_data_make_a_kalman_filter(void)
     }
 }
 
+/* -1/2 of the squared innovations of both axes by the inverse of their covariance, particle by particle. */
+void test_the_log_likelihood_is_that_of_both_axes(void)
+{
+    float x[PFL_WIND_STATES * N];
+    float ll[N];
+    uint64_t dice = 17u;
+    const pfl_view_t view = {x, N, 0u, N};
+    const pfl_wind_fix_t fix = {12.0f, -7.0f, 9.0f, 4.0f, 11.0f, 0.6f, 1.0f};
+    const double inverse[3] = {0.25, -0.0625, 0.125};
+    for (uint32_t k = 0u; k < 3u; k++) {
+        wind.inverse[k] = (float)inverse[k];
+    }
+    for (uint32_t k = 0u; k < PFL_WIND_STATES * N; k++) {
+        x[k] = (float)(3.0 * ut_gaussian(&dice));
+    }
+    pfl_wind_loglik(&wind, &fix, &view, ll);
+    for (uint32_t i = 0u; i < N; i++) {
+        const double air = 11.0 * (double)x[PFL_WIND_SCALE * N + i];
+        const double yaw = (double)fix.yaw_rad + (double)x[PFL_WIND_OFFSET * N + i];
+        const double position[2] = {12.0 - (double)x[PFL_WIND_X * N + i], -7.0 - (double)x[PFL_WIND_Y * N + i]};
+        const double velocity[2] = {
+            9.0 - air * cos(yaw) - (double)x[PFL_WIND_X_WIND * N + i] - (double)x[PFL_WIND_X_GUST * N + i],
+            4.0 - air * sin(yaw) - (double)x[PFL_WIND_Y_WIND * N + i] - (double)x[PFL_WIND_Y_GUST * N + i]};
+        double expected = 0.0;
+        for (int axis = 0; axis < 2; axis++) {
+            const double p = position[axis];
+            const double v = velocity[axis];
+            expected -= 0.5 * (inverse[0] * p * p + 2.0 * inverse[1] * p * v + inverse[2] * v * v);
+        }
+        TEST_ASSERT_DOUBLE_WITHIN(1e-5 * (1.0 - expected), expected, (double)ll[i]);
+    }
+}
+
 void test_scale_and_offset_turn_the_way(void)
 {
     float x[PFL_WIND_STATES * N];
