@@ -460,8 +460,11 @@ void test_wrong_calls_are_refused(void)
     adaptive = good;
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_adapt(f, &adaptive));
     TEST_ASSERT_EQUAL_INT(PFL_ERR_MEMORY, pfl_adaptive_init(words, 100u, &adaptive, 0u, &f));
+    TEST_ASSERT_NULL(f);
+    f = start();
     adaptive.least = MOST + 1u;
     TEST_ASSERT_EQUAL_INT(PFL_ERR_CONFIG, pfl_adaptive_init(words, 100u, &adaptive, 0u, &f));
+    TEST_ASSERT_NULL(f);
 }
 
 static void check_refused(pfl_t *f, const pfl_adaptive_t *good)

@@ -402,6 +402,55 @@ void test_with_constant_matrices_both_forms_are_the_same_filter(void)
     TEST_ASSERT_DOUBLE_WITHIN(0.01 * shared.l_squares, shared.l_squares, each.l_squares);
 }
 
+/* One step of both forms, no element of any matrix zero: the same means, driven states and covariance, over two strips
+ * and a part of one. */
+void test_with_full_matrices_both_forms_make_the_same_step(void)
+{
+    enum { TWO_N = 40, TWO_COV = 4, TWO_LOGLIK = 7, TWO_STATES };
+    const pfl_marginal_t model = {
+        .linear = 2u,
+        .mean = 2u,
+        .driven = 2u,
+        .measured = 1u,
+        .state = {0u, 1u},
+        .noise = {0u, 1u},
+        .loglik_state = TWO_LOGLIK,
+        .drive = {{1.0f, -0.5f}, {0.75f, 2.0f}},
+        .drive_variance = {0.25f, 0.5f},
+        .transition = {{0.9f, 0.3f}, {-0.2f, 0.8f}},
+        .drift = {0.1f, -0.4f},
+        .process_cov = {0.2f, 0.05f, 0.3f},
+        .see = {{1.0f, 0.5f}},
+        .see_variance = {0.4f},
+    };
+    pfl_marginal_shared_t shared = {.model = model, .cov = {1.5f, 0.25f, 0.75f}};
+    pfl_marginal_each_t each = {.model = model, .cov = TWO_COV, .work = work};
+    static float x[2][TWO_STATES * TWO_N];
+    static float noise[2u * PFL_BATCH];
+    uint64_t dice = 31u;
+    const float z = 0.3f;
+    const pfl_marginal_input_t in = {NULL, &z};
+    for (uint32_t k = 0u; k < 2u * PFL_BATCH; k++) {
+        noise[k] = (float)ut_gaussian(&dice);
+    }
+    for (uint32_t k = 0u; k < TWO_STATES * TWO_N; k++) {
+        const uint32_t d = k / TWO_N;
+        x[0][k] = ((d >= TWO_COV) && (d < TWO_LOGLIK)) ? shared.cov[d - TWO_COV] : (float)ut_gaussian(&dice);
+    }
+    (void)memcpy(x[1], x[0], sizeof x[0]);
+    const pfl_batch_t for_shared = {x[0], TWO_N, noise, 0u, TWO_N};
+    const pfl_batch_t for_each = {x[1], TWO_N, noise, 0u, TWO_N};
+    pfl_marginal_shared_step(&shared, true);
+    pfl_marginal_shared_predict(&shared, &in, 1.0f, &for_shared);
+    pfl_marginal_each_predict(&each, &in, 1.0f, &for_each);
+    for (uint32_t k = 0u; k < TWO_COV * TWO_N; k++) {
+        TEST_ASSERT_FLOAT_WITHIN(1e-5f, x[0][k], x[1][k]);
+    }
+    for (uint32_t k = TWO_COV * TWO_N; k < TWO_LOGLIK * TWO_N; k++) {
+        TEST_ASSERT_FLOAT_WITHIN(1e-6f, shared.cov[(k / TWO_N) - TWO_COV], x[1][k]);
+    }
+}
+
 /* ---- A mixed model whose matrices depend on the particle: an unknown rate of turn ---------------------------------- */
 
 enum { CT_RATE, CT_X, CT_Y, CT_VX, CT_VY, CT_BOOTSTRAP_STATES, CT_COV = 5, CT_LOGLIK = 15, CT_STATES };
