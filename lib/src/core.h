@@ -209,7 +209,7 @@ typedef enum {
     WATCH_MOVED,   /* a predict ended, `number` particles quarantined */
     WATCH_FUSED,   /* a measurement of sensor `number` */
     WATCH_REFUSED, /* z of sensor `number` */
-    WATCH_RESET    /* or reinjected */
+    WATCH_RESET
 } pfl_watch_call_t;
 
 static inline pfl_status_t pfl_watch_tell(pfl_t *f, pfl_watch_call_t what, uint32_t number, const void *z)
@@ -225,7 +225,7 @@ uint32_t pfl_mend_log_weights(pfl_t *f); /* such as no update can have written c
 bool pfl_revive_random(pfl_t *f);        /* seeds dead streams anew; true when there were such */
 
 /* reset.c */
-void pfl_reinject(pfl_t *f, uint32_t sensor, const void *z);
+bool pfl_reinject(pfl_t *f, uint32_t sensor, const void *z);
 
 /* meter.c */
 void pfl_meter_begin(pfl_t *f);    /* of a filter cycle */

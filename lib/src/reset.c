@@ -28,7 +28,6 @@ static void account(pfl_t *f, uint32_t event)
     f->resample_pending = 0u;
     pfl_count(&f->resets, 1u);
     f->watched.event |= event;
-    (void)pfl_watch_tell(f, WATCH_RESET, 0u, NULL);
 }
 
 static pfl_status_t reset(pfl_t *f, uint64_t t_us)
@@ -46,6 +45,7 @@ static pfl_status_t reset(pfl_t *f, uint64_t t_us)
     f->t_fused_us = t_us;
     f->test_ratio = 0.0f;
     account(f, PFL_EVENT_RESET);
+    (void)pfl_watch_tell(f, WATCH_RESET, 0u, NULL);
     return (drawn == PFL_OK) ? PFL_OK : pfl_fault(f, drawn);
 }
 
@@ -69,11 +69,11 @@ static void redraw(pfl_t *f, const pfl_sensor_t *sensor, const void *z, const pf
     pfl_guard_after_callback(f);
 }
 
-void pfl_reinject(pfl_t *f, uint32_t sensor, const void *z)
+bool pfl_reinject(pfl_t *f, uint32_t sensor, const void *z)
 {
     const pfl_sensor_t *s = &f->config->sensors[sensor];
     if ((s->redraw == NULL) && (f->config->draw == NULL)) {
-        return;
+        return false;
     }
     const uint32_t count = f->config->particles;
     const uint32_t share = (uint32_t)(f->config->watch->reinject * (float)count);
@@ -95,6 +95,7 @@ void pfl_reinject(pfl_t *f, uint32_t sensor, const void *z)
     pfl_weights_equal(f);
     (void)pfl_moments(f, false);
     account(f, PFL_EVENT_REINJECTED);
+    return true;
 }
 
 /* ---- The account ----------------------------------------------------------------------------------------------- */

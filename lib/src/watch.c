@@ -98,7 +98,7 @@ static void enter(pfl_t *f, pfl_phase_t phase)
 }
 
 /* A reset must not look better than what made it necessary. */
-static void settle(pfl_t *f)
+PFL_NOINLINE static void settle(pfl_t *f)
 {
     f->watched.settled = 0u;
     f->watched.refused = 0u;
@@ -190,8 +190,9 @@ static void refused(pfl_t *f, uint32_t sensor, const void *z)
     f->sensor[sensor].test_ratio = f->test_ratio;
     f->sensor[sensor].refused++;
     judge(f);
-    if ((f->watched.phase == (uint32_t)PFL_PHASE_LOST) && (f->config->watch->reinject > 0.0f)) {
-        pfl_reinject(f, sensor, z);
+    const bool lost = f->watched.phase == (uint32_t)PFL_PHASE_LOST;
+    if (lost && (f->config->watch->reinject > 0.0f) && pfl_reinject(f, sensor, z)) {
+        settle(f);
     }
 }
 
