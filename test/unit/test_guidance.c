@@ -450,6 +450,32 @@ void test_nmpc_penalty_is_the_same_both_ways(void)
     TEST_ASSERT_FLOAT_WITHIN(1e-5f * expected, expected, cost);
 }
 
+/* A cost that is quadratic in one kind of command alone: the descent finds its minimum. */
+void test_nmpc_finds_the_minimum_of_a_parabola(void)
+{
+    for (uint32_t kind = 0u; kind < 2u; kind++) {
+        situation_t s;
+        pfl_nmpc_report_t report;
+        make_situation(&s, 0u);
+        s.problem.pair = NULL;
+        s.nmpc.distance_weight = s.nmpc.distance_weight_last = 0.0f;
+        s.nmpc.phase_weight = s.nmpc.phase_weight_last = 0.0f;
+        s.nmpc.penalty = 0.0f;
+        s.nmpc.speed_weight = (kind == 0u) ? 100.0f : 0.0f;
+        s.nmpc.turn_weight = (kind == 0u) ? 0.0f : 50.0f;
+        const pfl_uav_limits_t *l = &s.nmpc.limits;
+        s.plan = constant_plan(l->cruise_mps + 0.8f * l->speed_range_mps, -0.5f * l->turn_max_radps);
+        TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_nmpc_solve(&s.nmpc, &s.problem, &s.plan, &work, &report));
+        for (uint32_t k = 0u; k < PFL_NMPC_STEPS; k++) {
+            if (kind == 0u) {
+                TEST_ASSERT_FLOAT_WITHIN(0.01f * l->speed_range_mps, l->cruise_mps, s.plan.speed_mps[k]);
+            } else {
+                TEST_ASSERT_FLOAT_WITHIN(0.01f * l->turn_max_radps, s.nmpc.turn_nominal_radps, s.plan.turn_radps[k]);
+            }
+        }
+    }
+}
+
 void test_nmpc_never_gets_worse_and_keeps_its_bound(void)
 {
     uint32_t most = 0u;

@@ -90,6 +90,27 @@ static void expect_phase(const pfl_t *f, pfl_phase_t phase)
 
 /* ---- Phases ------------------------------------------------------------------------------------------------------ */
 
+/* With a watch the best log-likelihood is told for sensors without a gate, too. */
+void test_a_watch_knows_the_best_log_likelihood_without_a_gate(void)
+{
+    watched_t gated;
+    watched_t watched;
+    make_watched(&gated);
+    make_watched(&watched);
+    gated.config.watch = NULL;
+    gated.sensors[0].gate = 1.0e6f;
+    watched.sensors[0].gate = 0.0f;
+    gated.config.ess_ratio = watched.config.ess_ratio = 0.0f; /* weights differ from the second update on */
+    pfl_t *a = ut_filter(&gated.config);
+    pfl_t *b = ut_filter(&watched.config);
+    const uint64_t begin_us = now_us;
+    cycles(a, 3u);
+    now_us = begin_us;
+    cycles(b, 3u);
+    TEST_ASSERT_TRUE(health_of(a).best_loglik < 0.0f);
+    TEST_ASSERT_EQUAL_HEX32(ut_bits(health_of(a).best_loglik), ut_bits(health_of(b).best_loglik));
+}
+
 void test_without_a_watch_no_phase_is_judged(void)
 {
     const pfl_config_t c = ut_linear_config(N);
@@ -580,6 +601,20 @@ void test_scrub_mends_particles_weights_and_streams(void)
     TEST_ASSERT_TRUE(pfl_invariants_hold(f));
     TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_scrub(f, NULL));
     cycles(f, 3u);
+}
+
+/* What a resampling leaves in the column of weights is no damage. */
+void test_scrub_mends_nothing_after_a_resampling(void)
+{
+    watched_t w;
+    make_watched(&w);
+    pfl_t *f = ut_filter(&w.config);
+    cycles(f, 3u);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_resample(f));
+    uint32_t mended = 1u;
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_scrub(f, &mended));
+    TEST_ASSERT_EQUAL_UINT32(0u, mended);
+    TEST_ASSERT_EQUAL_UINT32(0u, health_of(f).event & PFL_EVENT_MENDED);
 }
 
 /* Nothing is above the top then, and nothing at it. */

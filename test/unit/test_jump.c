@@ -111,6 +111,27 @@ void test_the_odds_of_jumps(void)
     }
 }
 
+static void count_calls(void *user, const void *u, float dt_s, const pfl_batch_t *p)
+{
+    (void)u;
+    (void)dt_s;
+    (void)p;
+    (*(uint32_t *)user)++;
+}
+
+void test_a_model_without_particles_is_not_called(void)
+{
+    float x[STATES * PFL_BATCH] = {0.0f};
+    float noise[2u * PFL_BATCH] = {0.0f};
+    uint32_t calls[2] = {0u, 0u};
+    const pfl_batch_t batch = {x, PFL_BATCH, noise, 0u, PFL_BATCH};
+    jump.regime[0] = (pfl_regime_t){count_calls, &calls[0]};
+    jump.regime[1] = (pfl_regime_t){count_calls, &calls[1]};
+    pfl_jump_predict(&jump, NULL, 0.5f, &batch);
+    TEST_ASSERT_EQUAL_UINT32(1u, calls[0]);
+    TEST_ASSERT_EQUAL_UINT32(0u, calls[1]);
+}
+
 void test_each_particle_moves_by_its_own_model(void)
 {
     float x[STATES * PFL_BATCH];
