@@ -204,6 +204,8 @@ void test_moments_beyond_single_precision_are_refused_untouched(void)
     }
     f = weighed(N, 2u, 0u, PFL_MOMENTS_FULL);
     TEST_ASSERT_EQUAL_INT(PFL_ERR_NONFINITE, pfl_estimate(f, mean, cov));
+    f = weighed(N, 2u, 0u, PFL_MOMENTS_MEAN);
+    TEST_ASSERT_EQUAL_INT(PFL_ERR_NONFINITE, pfl_estimate(f, mean, NULL));
 }
 
 void test_effective_sample_size_matches_its_formula(void)

@@ -273,10 +273,12 @@ static void fly_at(uint32_t i, float px, float py, float vx, float vy)
 /* Only speed against a road counts against it: with it, the nearest is the nearest. */
 void test_speed_along_a_road_does_not_make_it_farther(void)
 {
-    const pfl_batch_t b = batch_of(1u);
+    const pfl_batch_t b = batch_of(2u);
     fly_at(0u, 4.2f, 4.0f, 5.0f, 0.0f);
+    fly_at(1u, 3.0f, 50.0f, 0.0f, 5.0f);
     pfl_road_put(&graph, 2.0f, &b);
     TEST_ASSERT_EQUAL_FLOAT((float)TO_EAST, state(PFL_ROAD_EDGE, 0u));
+    TEST_ASSERT_EQUAL_FLOAT((float)TO_NORTH, state(PFL_ROAD_EDGE, 1u));
 }
 
 void test_particles_are_put_on_the_nearest_road_that_goes_their_way(void)
