@@ -186,6 +186,25 @@ void test_three_refusals_in_a_row_lose_it_and_fusing_again_settles_it(void)
     TEST_ASSERT_TRUE(health_of(f).test_ratio < 1.0f);
 }
 
+/* A lost filter that is reset keeps the score by which it was lost, whatever was refused after. */
+void test_the_reset_of_a_lost_filter_keeps_the_score_of_its_loss(void)
+{
+    watched_t w;
+    make_watched(&w);
+    pfl_t *f = ut_filter(&w.config);
+    cycles(f, 12u);
+    for (uint32_t k = 0u; k < 3u; k++) {
+        TEST_ASSERT_EQUAL_INT(PFL_REJECTED, cycle(f, 100.0f));
+    }
+    expect_phase(f, PFL_PHASE_LOST);
+    const float at_loss = health_of(f).test_ratio;
+    TEST_ASSERT_EQUAL_INT(PFL_REJECTED, cycle(f, 50.0f));
+    TEST_ASSERT_TRUE(health_of(f).test_ratio < at_loss);
+    TEST_ASSERT_EQUAL_INT(PFL_OK, pfl_reset(f, now_us));
+    expect_phase(f, PFL_PHASE_SETTLING);
+    TEST_ASSERT_EQUAL_FLOAT(at_loss, health_of(f).test_ratio);
+}
+
 void test_a_stale_sensor_degrades_and_nothing_fused_for_long_loses(void)
 {
     watched_t w;
