@@ -358,12 +358,18 @@ void test_an_impossible_particle_far_away_does_not_move_the_mean(void)
 
 /* ---- Gate --------------------------------------------------------------------------------------------------------- */
 
+static pfl_t *gated(pfl_config_t *c)
+{
+    static const pfl_sensor_t sensor = {.loglik = ut_dictated_loglik, .gate = 8.0f};
+    *c = ut_dictated_config(N, 1u);
+    c->sensors = &sensor;
+    return ut_filter(c);
+}
+
 void test_gate_refuses_beyond_it_and_tells_the_ratio(void)
 {
-    const pfl_sensor_t gated = {.loglik = ut_dictated_loglik, .gate = 8.0f};
-    pfl_config_t c = ut_dictated_config(N, 1u);
-    c.sensors = &gated;
-    pfl_t *f = ut_filter(&c);
+    pfl_config_t c;
+    pfl_t *f = gated(&c);
     for (uint32_t i = 0u; i < N; i++) {
         ll[i] = -3.96f - (float)i;
     }
@@ -388,10 +394,8 @@ void test_gate_refuses_beyond_it_and_tells_the_ratio(void)
 /* -2 times the best log-likelihood equals the gate: the ratio is one to the bit, and within. */
 void test_the_gate_itself_is_within(void)
 {
-    const pfl_sensor_t gated = {.loglik = ut_dictated_loglik, .gate = 8.0f};
-    pfl_config_t c = ut_dictated_config(N, 1u);
-    c.sensors = &gated;
-    pfl_t *f = ut_filter(&c);
+    pfl_config_t c;
+    pfl_t *f = gated(&c);
     for (uint32_t i = 0u; i < N; i++) {
         ll[i] = -4.0f;
     }
@@ -402,10 +406,8 @@ void test_the_gate_itself_is_within(void)
 /* Within the rounding slack a log-likelihood may be positive: its ratio is zero, never negative. */
 void test_the_ratio_of_a_match_better_than_perfect_is_zero(void)
 {
-    const pfl_sensor_t gated = {.loglik = ut_dictated_loglik, .gate = 8.0f};
-    pfl_config_t c = ut_dictated_config(N, 1u);
-    c.sensors = &gated;
-    pfl_t *f = ut_filter(&c);
+    pfl_config_t c;
+    pfl_t *f = gated(&c);
     for (uint32_t i = 0u; i < N; i++) {
         ll[i] = 0.5f * PFL_LOGLIK_MAX;
     }

@@ -88,6 +88,16 @@ static void expect_phase(const pfl_t *f, pfl_phase_t phase)
     TEST_ASSERT_EQUAL_INT(usable, (h.mode & PFL_MODE_USABLE) != 0u);
 }
 
+/* Tracking, then three refusals in a row. */
+static void lose(pfl_t *f)
+{
+    cycles(f, 12u);
+    for (uint32_t k = 0u; k < 3u; k++) {
+        TEST_ASSERT_EQUAL_INT(PFL_REJECTED, cycle(f, 100.0f));
+    }
+    expect_phase(f, PFL_PHASE_LOST);
+}
+
 /* ---- Phases ------------------------------------------------------------------------------------------------------ */
 
 /* With a watch the best log-likelihood is told for sensors without a gate, too. */
@@ -169,11 +179,7 @@ void test_three_refusals_in_a_row_lose_it_and_fusing_again_settles_it(void)
     watched_t w;
     make_watched(&w);
     pfl_t *f = ut_filter(&w.config);
-    cycles(f, 12u);
-    for (uint32_t k = 0u; k < 3u; k++) {
-        TEST_ASSERT_EQUAL_INT(PFL_REJECTED, cycle(f, 100.0f));
-    }
-    expect_phase(f, PFL_PHASE_LOST);
+    lose(f);
     TEST_ASSERT_TRUE((health_of(f).event & PFL_EVENT_LOST) != 0u);
     const float before = health_of(f).test_ratio;
     cycles(f, 1u);
@@ -192,11 +198,7 @@ void test_the_reset_of_a_lost_filter_keeps_the_score_of_its_loss(void)
     watched_t w;
     make_watched(&w);
     pfl_t *f = ut_filter(&w.config);
-    cycles(f, 12u);
-    for (uint32_t k = 0u; k < 3u; k++) {
-        TEST_ASSERT_EQUAL_INT(PFL_REJECTED, cycle(f, 100.0f));
-    }
-    expect_phase(f, PFL_PHASE_LOST);
+    lose(f);
     const float at_loss = health_of(f).test_ratio;
     TEST_ASSERT_EQUAL_INT(PFL_REJECTED, cycle(f, 50.0f));
     TEST_ASSERT_TRUE(health_of(f).test_ratio < at_loss);

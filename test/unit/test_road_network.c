@@ -270,8 +270,8 @@ static void fly_at(uint32_t i, float px, float py, float vx, float vy)
     x[PFL_ROAD_VY * PFL_BATCH + i] = vy;
 }
 
-/* Only speed against a road counts against it: with it, the nearest is the nearest. */
-void test_speed_along_a_road_does_not_make_it_farther(void)
+/* Only speed against a road counts against it: a particle that goes its way is put on the nearest. */
+void test_a_particle_that_goes_its_way_is_put_on_the_nearest_road(void)
 {
     const pfl_batch_t b = batch_of(2u);
     fly_at(0u, 4.2f, 4.0f, 5.0f, 0.0f);
